@@ -1,0 +1,51 @@
+"""What all tests share: a usable LLVM, and a Dr.Jit that each test finds as it was at the start."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tracer.errors import MachineError
+from tracer.llvm import ensure_llvm
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+def pytest_sessionstart() -> None:
+    """Without a usable LLVM the run ends at once, with the sentence that users see."""
+    try:
+        ensure_llvm()
+    except MachineError as error:
+        pytest.exit(str(error), returncode=error.exit_code)
+
+
+def pytest_report_header() -> str:
+    """Names the LLVM in use: pictures may differ in the last bits from one to the next."""
+    return f"backend: {ensure_llvm()}"
+
+
+@pytest.fixture(autouse=True)
+def _drjit_state() -> Iterator[None]:
+    """Undoes what a test changed in Dr.Jit; compiled kernels stay, since compiling is what costs time."""
+    import drjit as dr
+
+    # Default is a sum of flags, and the scopes are Dr.Jit's own marks.
+    inner = {dr.JitFlag.Default, dr.JitFlag.SymbolicScope, dr.JitFlag.FreezingScope}
+    flags = {flag: dr.flag(flag) for flag in dr.JitFlag if flag not in inner}
+    threads = dr.thread_count()
+    yield
+    dr.sync_thread()
+    for flag, value in flags.items():
+        dr.set_flag(flag, value)
+    if dr.thread_count() != threads:
+        dr.set_thread_count(threads)
+    dr.kernel_history_clear()
+
+
+@pytest.fixture(scope="session")
+def repository() -> Path:
+    """The root of the repository."""
+    return Path(__file__).resolve().parents[1]

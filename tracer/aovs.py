@@ -1,0 +1,70 @@
+"""Layers of the nearest sub-ray's hit: computed again from the pixel and the primitive, not carried by the loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from tracer.canvas import DeviceCanvas
+from tracer.device_scene import DeviceScene
+from tracer.intersection import Surface, free_ray, surface_at
+from tracer.ray import Hit
+from tracer.textures.tables import PICTURE, texture_row
+from tracer.whitted import PixelColumns, PixelGrid, primary_ray, texture_point
+
+Layer = Callable[[DeviceScene, Surface, Any, Any], Any]
+"""(scene, surface, primitive, mask of hits) -> values (n,) or (components, n)."""
+
+
+def _vector(pick: Callable[[Surface], Any]) -> Layer:
+    return lambda scene, surface, primitive, found: dr.select(found, pick(surface), float("nan"))
+
+
+def _shape(scene: DeviceScene, surface: Surface, primitive: Any, found: Any) -> Any:
+    return dr.select(found, scene.backend.Int32(surface.shape), -1)
+
+
+def _primitive(scene: DeviceScene, surface: Surface, primitive: Any, found: Any) -> Any:
+    backend = scene.backend
+    first = dr.gather(backend.IdVector4, scene.ids, surface.shape, found).w
+    return dr.select(found, backend.Int32(primitive - first), -1)
+
+
+def _uv(scene: DeviceScene, surface: Surface, primitive: Any, found: Any) -> Any:
+    row = texture_row(scene.backend, scene.textures, surface.texture, found)
+    u, v = row.coordinates(texture_point(scene, surface, found))
+    has_picture = found & (row.kind == PICTURE)
+    return scene.backend.Vector2(*(dr.select(has_picture, c, float("nan")) for c in (u, v)))
+
+
+LAYERS: dict[str, Layer] = {
+    "normal": _vector(lambda surface: surface.normal),
+    "Ng": _vector(lambda surface: surface.outward),
+    "position": _vector(lambda surface: surface.p),
+    "shape": _shape,
+    "primitive": _primitive,
+    "uv": _uv,
+}
+"""A new layer of the first hit is one line here."""
+
+
+def compute_layers(
+    scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, found: PixelColumns, names: list[str]
+) -> dict[str, Any]:
+    """Values of the layers for the pixels of a launch; NaN and -1 where nothing was hit."""
+    backend = scene.backend
+    o, d = primary_ray(backend, canvas, pixels, found.sub_ray)
+    valid = found.depth >= 0
+    ray = free_ray(scene, o, d)
+    surface = surface_at(scene, ray, Hit(found.depth, found.primitive), valid)
+    return {name: LAYERS[name](scene, surface, found.primitive, valid) for name in names}
+
+
+def empty_layer(name: str, height: int, width: int, dtype: Any) -> np.ndarray:
+    """Memory for a layer of the picture."""
+    if name in ("shape", "primitive"):
+        return np.empty((height, width), np.int64)
+    return np.empty((height, width, 2 if name == "uv" else 3), dtype)

@@ -1,0 +1,322 @@
+"""Compiles a scene description into what a kernel may touch: flat tables, width-1 numbers, integer ids.
+
+Structure (how many shapes of which kind, which options are on) is Python and part of the kernel; numbers live in
+memory, so moving a sphere or changing a color compiles nothing new.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tracer.acceleration.build import build_hierarchy
+from tracer.acceleration.traverse import TriangleTables
+from tracer.backends import INVALID, Backend
+from tracer.color import decode_srgb
+from tracer.errors import SceneError
+from tracer.light_samples import LightTables, compile_lights
+from tracer.material import Material
+from tracer.ray import SIDE_BITS
+from tracer.scene import Scene
+from tracer.shapes import Instance, Mesh, Plane, ShapeRecord, Sphere
+from tracer.shapes.sphere_table import SphereTable
+from tracer.shapes.triangles import MeshData, PlacedMesh, place_mesh, read_mesh
+from tracer.textures import Solid
+from tracer.textures.picture import read_picture
+from tracer.textures.tables import TextureTables, pack_textures
+
+PLANE, SPHERE, MESH = range(3)
+
+UNROLLED_SPHERES = 32
+"""Up to so many spheres stand in the kernel one by one; more are looped over."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """The switches of the model (document, sections 2 to 4); each variant is a kernel of its own."""
+
+    tir_reflects: bool
+    secondary_background: bool
+    transparent_shadows: bool
+    diffuse_is_lambert: bool
+
+
+@dataclass
+class SmoothTables:
+    """Vertex normals: 12 floats a triangle (3 unit normals, padded), and which shapes want them."""
+
+    normals: Any
+    shapes: Any
+
+
+@dataclass
+class HostScene:
+    """What the host knows of a compiled scene, in double precision.
+
+    `first_primitive` (shapes + 1,), `faces`: face numbers of each mesh by shape, `extent`: the largest |coordinate| of
+    the finite shapes, `meshes`: placed triangles by shape.
+    """
+
+    first_primitive: np.ndarray
+    meshes: dict[int, PlacedMesh] = field(default_factory=dict)
+    extent: float = 0.0
+
+
+@dataclass
+class DeviceScene:
+    """A scene in Dr.Jit memory, for one backend and precision.
+
+    `slots`: planes and spheres that stand in the kernel one by one, in the order of the shapes; `sphere_table`: all
+    spheres when they are many; `triangles`: those of all meshes. Tables by shape: `geometry` (4 floats: plane n, d or
+    sphere center, radius), `ids` (kind, texture, plane bit, first primitive), `materials` (8 floats: ior, k_r, k_t, m,
+    h, s, k_a, 0), `object_space` (12 floats: the 3x4 matrix back). By primitive, when there are meshes: `shape_of`,
+    `triangle_of`.
+    """
+
+    backend: Backend
+    options: Options
+    kinds: frozenset[int]
+    slots: list[Any]
+    sphere_table: SphereTable | None
+    triangles: TriangleTables | None
+    smooth: SmoothTables | None
+    shape_of: Any
+    triangle_of: Any
+    geometry: Any
+    ids: Any
+    materials: Any
+    object_space: Any
+    textures: TextureTables
+    lights: LightTables
+    ambient: Any
+    not_ambient: Any
+    background: Any
+    cutoff: Any
+    max_depth: Any
+    stack_size: int
+    host: HostScene
+
+
+def compile_scene(scene: Scene, backend: Backend) -> DeviceScene:
+    """The tables of a scene; raises `SceneError` for files that cannot be used."""
+    scene.check()
+    meshes = _placed_meshes(scene)
+    counts = [len(meshes[i].corners) if i in meshes else 1 for i in range(len(scene.shapes))]
+    first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    if first[-1] >= INVALID >> 1:
+        raise SceneError(f"{scene.name}: {first[-1]} primitives; allowed: fewer than 2^31")
+    host = HostScene(first, meshes, _extent(scene, meshes))
+    decode = decode_srgb if scene.color_space == "linear" else np.asarray
+    slots, sphere_table, planes = _analytic_shapes(scene, backend, first)
+    textures, texture_of = _textures(scene, backend, decode)
+    materials = np.array([_material_row(scene, shape) for shape in scene.shapes]).reshape(-1, 8)
+    return DeviceScene(
+        backend=backend,
+        options=Options(
+            tir_reflects=scene.tir == "reflect",
+            secondary_background=scene.secondary_background,
+            transparent_shadows=scene.transparent_shadows,
+            diffuse_is_lambert=scene.diffuse_term == "lambert",
+        ),
+        kinds=frozenset(_kind(shape) for shape in scene.shapes),
+        slots=slots,
+        sphere_table=sphere_table,
+        triangles=_triangle_tables(backend, host) if meshes else None,
+        smooth=_smooth_tables(scene, backend, meshes),
+        shape_of=backend.id_table(np.repeat(np.arange(len(counts)), counts)) if meshes else None,
+        triangle_of=backend.id_table(_triangle_numbers(counts, meshes)) if meshes else None,
+        geometry=backend.table(_geometry_rows(scene)),
+        ids=backend.id_table(_id_rows(scene, texture_of, first)),
+        materials=backend.table(materials if len(materials) else np.zeros(8)),
+        object_space=_object_space(scene, backend),
+        textures=textures,
+        lights=compile_lights(
+            backend,
+            scene.lights,
+            decode(np.array([light.color for light in scene.lights]).reshape(-1, 3)),
+            planes,
+            scene.seed,
+        ),
+        ambient=backend.opaque(scene.ambient),
+        not_ambient=backend.opaque(1 - scene.ambient),
+        background=backend.opaque_vector(decode(np.array(scene.background))),
+        cutoff=backend.opaque(scene.cutoff - 1e-6),
+        max_depth=backend.opaque_id(scene.max_depth),
+        stack_size=stack_entries(scene.cutoff, scene.max_depth),
+        host=host,
+    )
+
+
+def stack_entries(cutoff: float, max_depth: int) -> int:
+    """Pending rays of one pixel at most: they weigh <= 1 together and >= cutoff each, and one waits a level."""
+    return max(1, min(int(1 / (cutoff - 1e-6)), max_depth))
+
+
+def _kind(shape: ShapeRecord) -> int:
+    return PLANE if isinstance(shape, Plane) else SPHERE if isinstance(shape, Sphere) else MESH
+
+
+def _analytic_shapes(
+    scene: Scene, backend: Backend, first: np.ndarray
+) -> tuple[list[Any], SphereTable | None, np.ndarray]:
+    """Planes and spheres for the kernel, and the rows (n, d) of the planes that have bits."""
+    spheres = [i for i, shape in enumerate(scene.shapes) if isinstance(shape, Sphere)]
+    many = len(spheres) > UNROLLED_SPHERES
+    slots: list[Any] = []
+    planes: list[np.ndarray] = []
+    for i, shape in enumerate(scene.shapes):
+        if isinstance(shape, Plane):
+            slots.append(shape.slot(backend, int(first[i]), len(planes)))
+            planes.append(shape.placed_coefficients())
+        elif isinstance(shape, Sphere) and not many:
+            slots.append(shape.slot(backend, int(first[i]), len(planes)))
+    table = None
+    if many:
+        rows = [scene.shapes[i].placed_coefficients() for i in spheres]  # type: ignore[attr-defined]
+        table = SphereTable.of(backend, rows, [int(first[i]) for i in spheres])
+    return slots, table, np.array(planes[:SIDE_BITS]).reshape(-1, 4)
+
+
+def _geometry_rows(scene: Scene) -> np.ndarray:
+    rows = np.zeros((max(1, len(scene.shapes)), 4))
+    for i, shape in enumerate(scene.shapes):
+        if isinstance(shape, (Plane, Sphere)):
+            rows[i] = shape.placed_coefficients()
+    return rows
+
+
+def _id_rows(scene: Scene, texture_of: list[int], first: np.ndarray) -> np.ndarray:
+    rows = np.zeros((max(1, len(scene.shapes)), 4), np.int64)
+    planes = 0
+    for i, shape in enumerate(scene.shapes):
+        bit = 0
+        if isinstance(shape, Plane):
+            bit = 1 << planes if planes < SIDE_BITS else 0
+            planes += 1
+        rows[i] = _kind(shape), texture_of[i], bit, first[i]
+    return rows
+
+
+def source_of(scene: Scene, shape: ShapeRecord) -> ShapeRecord:
+    """The mesh that an instance shares; every other shape itself."""
+    if not isinstance(shape, Instance):
+        return shape
+    return next(other for other in scene.shapes if other.name == shape.of)
+
+
+def _inherited(scene: Scene, shape: ShapeRecord, key: str) -> Any:
+    own = getattr(shape, key)
+    return getattr(source_of(scene, shape), key) if own is None else own
+
+
+def _material_row(scene: Scene, shape: ShapeRecord) -> list[float]:
+    name = _inherited(scene, shape, "material")
+    m = Material() if name is None else scene.materials[name]
+    return [m.ior, m.reflection, m.refraction, m.diffuse, m.specular, m.shininess, m.absorption, 0.0]
+
+
+def _textures(
+    scene: Scene, backend: Backend, decode: Callable[[np.ndarray], np.ndarray]
+) -> tuple[TextureTables, list[int]]:
+    """The tables, and the number of each shape's texture: the named ones first, then one per color."""
+    names = list(scene.textures)
+    records = list(scene.textures.values())
+    solids: dict[tuple[float, float, float], int] = {}
+    texture_of = []
+    for shape in scene.shapes:
+        has_own = shape.texture is not None or shape.color is not None
+        look = shape if has_own else source_of(scene, shape)
+        if look.texture is not None:
+            texture_of.append(names.index(look.texture))
+            continue
+        color = (1.0, 1.0, 1.0) if look.color is None else look.color
+        if color not in solids:
+            solids[color] = len(records)
+            records.append(Solid(color=color))
+        texture_of.append(solids[color])
+    if not records:
+        records.append(Solid(color=(1.0, 1.0, 1.0)))
+    tables = pack_textures(
+        backend, records, scene.literal, decode, lambda file: read_picture(scene.resolve(file))
+    )
+    return tables, texture_of
+
+
+def _placed_meshes(scene: Scene) -> dict[int, PlacedMesh]:
+    """Triangles of every mesh and instance, by shape; each file is read once."""
+    read: dict[int, MeshData] = {}
+    placed = {}
+    for i, shape in enumerate(scene.shapes):
+        mesh = source_of(scene, shape)
+        if not isinstance(mesh, Mesh):
+            continue
+        if id(mesh) not in read:
+            path = None if mesh.file is None else scene.resolve(mesh.file)
+            read[id(mesh)] = read_mesh(mesh, path, f"{scene.name}: shapes.{mesh.name or i}")
+        placed[i] = place_mesh(read[id(mesh)], shape.placement)
+        if not np.isfinite(placed[i].corners).all():
+            raise SceneError(f"{scene.name}: shapes.{shape.name or i} leaves the range of single precision")
+    return placed
+
+
+def _triangle_tables(backend: Backend, host: HostScene) -> TriangleTables:
+    corners = np.concatenate([mesh.corners for mesh in host.meshes.values()])
+    normals = np.concatenate([mesh.normals for mesh in host.meshes.values()])
+    rows = np.concatenate([corners.reshape(-1, 9), normals], axis=1)
+    hierarchy = build_hierarchy(corners)
+    boxes = np.zeros((len(hierarchy.boxes), 8))
+    boxes[:, 0:3], boxes[:, 4:7] = hierarchy.boxes[:, :3], hierarchy.boxes[:, 3:]
+    primitives = [
+        np.arange(len(mesh.corners)) + host.first_primitive[shape] for shape, mesh in host.meshes.items()
+    ]
+    return TriangleTables(
+        triangles=backend.table(rows),
+        boxes=backend.table(boxes),
+        order=backend.id_table(hierarchy.order),
+        primitive=backend.id_table(np.concatenate(primitives)),
+        leaf_count=backend.opaque_id(hierarchy.leaf_count),
+        extent=backend.opaque(np.abs(corners).max()),
+    )
+
+
+def _triangle_numbers(counts: list[int], meshes: dict[int, PlacedMesh]) -> np.ndarray:
+    """For each primitive its place among all triangles (0 for planes and spheres, which never ask)."""
+    is_triangle = np.repeat([i in meshes for i in range(len(counts))], counts)
+    return np.where(is_triangle, np.cumsum(is_triangle) - 1, 0)
+
+
+def _smooth_tables(scene: Scene, backend: Backend, meshes: dict[int, PlacedMesh]) -> SmoothTables | None:
+    wanted = [
+        i in meshes and bool(_inherited(scene, shape, "smooth")) for i, shape in enumerate(scene.shapes)
+    ]
+    if not any(wanted):
+        return None
+    normals = np.concatenate([mesh.corner_normals for mesh in meshes.values()]).reshape(-1, 9)
+    rows = np.zeros((len(normals), 12))
+    rows[:, :9] = normals
+    return SmoothTables(backend.table(rows), backend.id_table(wanted))
+
+
+def _object_space(scene: Scene, backend: Backend) -> Any:
+    """The 3x4 matrices back to object space, or None when no shape asks for them."""
+    wanted = [_inherited(scene, shape, "texture_space") == "object" for shape in scene.shapes]
+    if not any(wanted):
+        return None
+    rows = np.tile(np.eye(3, 4), (len(wanted), 1, 1))
+    for i, shape in enumerate(scene.shapes):
+        if wanted[i]:
+            rows[i] = shape.placement.inverse()
+    return backend.table(rows)
+
+
+def _extent(scene: Scene, meshes: dict[int, PlacedMesh]) -> float:
+    """S: the largest |coordinate| of the finite shapes (spheres and meshes), 0 without any."""
+    largest = [float(np.abs(mesh.corners).max()) for mesh in meshes.values()]
+    for shape in scene.shapes:
+        if isinstance(shape, Sphere):
+            row = shape.placed_coefficients()
+            largest.append(float(np.abs(row[:3]).max() + row[3]))
+    return max(largest, default=0.0)

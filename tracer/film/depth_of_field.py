@@ -1,0 +1,198 @@
+"""Depth of field: a filter over the finished picture that mixes pixels of similar distance (document, section 8).
+
+For a pixel of depth x the blur measure is f = max(x/focus, focus/x). Draws go to pixels less than f columns and rows
+away whose distance from the eye differs by less than `depth_range`; the result is the mean of their first-pass
+colors. All arithmetic is in double precision on the depth as stored.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from tracer.backends import Backend, find_backend
+from tracer.camera import DepthOfField
+from tracer.canvas import Canvas
+from tracer.random import DEPTH_OF_FIELD_STREAM, below, philox
+
+ATTEMPTS = 64
+"""Misses after which a draw stops guessing and counts the pixels it may take."""
+
+LARGEST_REACH = 1 << 20
+
+
+def blur_reach(depth: np.ndarray, settings: DepthOfField, canvas: Canvas) -> int:
+    """How many columns and rows away the filter reads at most, for pixels of that depth (h, w)."""
+    x = depth[depth > 0].astype(np.float64)
+    if not len(x):
+        return 0
+    measure = max(x.max() / settings.focus, settings.focus / x.min())
+    return int(min(np.ceil(measure * canvas.scale) - 1, LARGEST_REACH))
+
+
+@dataclass
+class _FirstPass:
+    """The picture that the filter reads, in Dr.Jit memory, for the rectangle x0, y0 .. (width columns)."""
+
+    color: Any
+    depth: Any
+    x0: int
+    y0: int
+    x1: int
+    y1: int
+
+    def index(self, backend: Backend, column: Any, row: Any) -> Any:
+        """Place of a pixel of the full picture in the arrays."""
+        width = backend.opaque_id(self.x1 - self.x0)
+        return (row - backend.opaque_id(self.y0)) * width + (column - backend.opaque_id(self.x0))
+
+
+def depth_of_field(
+    backend: Backend,
+    color: np.ndarray,
+    depth: np.ndarray,
+    source: tuple[int, int, int, int],
+    target: tuple[int, int, int, int],
+    settings: DepthOfField,
+    canvas: Canvas,
+) -> np.ndarray:
+    """The filtered colors (h, w, 3) of the rectangle `target` from a first pass over the rectangle `source`.
+
+    `color` (h', w', 3), `depth` (h', w'): the first pass, at least as far as the filter reaches.
+    """
+    double = find_backend(backend.name, "double")
+    first = _FirstPass(double.table(color), double.table(depth), *source)
+    x0, y0, x1, y1 = target
+    width, height = x1 - x0, y1 - y0
+    lane = dr.arange(double.UInt32, width * height)
+    row = lane // double.opaque_id(width)
+    column = lane - row * double.opaque_id(width)
+    mixed = _filter(
+        double, first, column + double.opaque_id(x0), row + double.opaque_id(y0), settings, canvas
+    )
+    return np.ascontiguousarray(mixed.numpy().T.reshape(height, width, 3), dtype=color.dtype)
+
+
+@dr.syntax
+def _filter(
+    backend: Backend, first: _FirstPass, column: Any, row: Any, settings: DepthOfField, canvas: Canvas
+) -> Any:
+    # ---- Window and admissible range of every pixel ----
+    width = dr.width(column)
+    index = first.index(backend, column, row)
+    x = dr.gather(backend.Float, first.depth, index)
+    own = dr.gather(backend.Vector3, first.color, index)
+    sharp = x > 0
+    focus = backend.opaque(settings.focus)
+    measure = dr.select(sharp, dr.maximum(x / focus, focus / x), 1)
+    steps = dr.ceil(measure * backend.opaque(canvas.scale)) - 1
+    reach = backend.UInt32(dr.minimum(dr.maximum(steps, 0), LARGEST_REACH))
+    low_column, columns = _window(backend, column, reach, first.x0, first.x1)
+    low_row, rows = _window(backend, row, reach, first.y0, first.y1)
+    eye = _eye_distance(backend, canvas, column, row) + x
+    depth_range = backend.opaque(
+        0.1 * settings.focus if settings.depth_range is None else settings.depth_range
+    )
+    pixel = row * backend.opaque_id(canvas.width) + column
+    key = (backend.opaque_id(settings.seed & 0xFFFFFFFF), backend.UInt32(DEPTH_OF_FIELD_STREAM))
+    samples = backend.opaque_id(settings.samples)
+
+    # ---- Draws: guess inside the window; after 64 misses count the admissible pixels and take one of them ----
+    total = dr.zeros(backend.Vector3, width)
+    drawn = dr.zeros(backend.UInt32, width)
+    attempt = dr.zeros(backend.UInt32, width)
+    admissible = dr.zeros(backend.UInt32, width)
+    active = sharp & (reach > 0)
+    while dr.hint(active, label="depth of field", exclude=[backend, first, canvas, settings]):
+        words = philox(key, (pixel, drawn, attempt, backend.UInt32(0)))
+        candidate_column = low_column + below(words[0], columns)
+        candidate_row = low_row + below(words[1], rows)
+        if dr.hint(active & (attempt == ATTEMPTS), exclude=[backend, first, canvas, settings]):
+            if dr.hint(admissible == 0, exclude=[backend, first, canvas, settings]):
+                admissible, _, _ = _scan(
+                    backend, first, canvas, low_column, columns, low_row, rows, eye, depth_range, 0xFFFFFFFF
+                )
+            _, candidate_column, candidate_row = _scan(
+                backend,
+                first,
+                canvas,
+                low_column,
+                columns,
+                low_row,
+                rows,
+                eye,
+                depth_range,
+                below(words[0], admissible),
+            )
+        taken = active & _admissible(
+            backend, first, canvas, candidate_column, candidate_row, eye, depth_range
+        )
+        found = dr.gather(
+            backend.Vector3, first.color, first.index(backend, candidate_column, candidate_row), taken
+        )
+        total += dr.select(taken, found, 0)
+        drawn += dr.select(taken, backend.UInt32(1), 0)
+        attempt = dr.select(taken, 0, attempt + 1)
+        active &= drawn < samples
+    return dr.select(sharp & (reach > 0), total / backend.Float(samples), own)
+
+
+def _window(backend: Backend, center: Any, reach: Any, low: int, high: int) -> tuple[Any, Any]:
+    """First coordinate and length of the window [center - reach, center + reach] within low .. high - 1."""
+    low_id, last = backend.opaque_id(low), backend.opaque_id(high - 1)
+    begin = dr.select(center - low_id > reach, center - reach, low_id)
+    end = dr.select(last - center > reach, center + reach, last)
+    return begin, end - begin + 1
+
+
+def _eye_distance(backend: Backend, canvas: Canvas, column: Any, row: Any) -> Any:
+    """|P - e| for the centers of pixels."""
+    size = backend.opaque(canvas.pixel_size)
+    x = (backend.Float(column) + 0.5 - backend.opaque(canvas.width / 2)) * size
+    y = (backend.Float(row) + 0.5 - backend.opaque(canvas.height / 2)) * size
+    distance = backend.opaque(canvas.distance)
+    return dr.sqrt(distance * distance + x * x + y * y)
+
+
+def _admissible(
+    backend: Backend, first: _FirstPass, canvas: Canvas, column: Any, row: Any, eye: Any, depth_range: Any
+) -> Any:
+    """Mask: the pixel is not blank and its distance from the eye differs from `eye` by less than the range."""
+    depth = dr.gather(backend.Float, first.depth, first.index(backend, column, row))
+    distance = _eye_distance(backend, canvas, column, row) + depth
+    return (depth > 0) & (dr.abs(distance - eye) < depth_range)
+
+
+@dr.syntax
+def _scan(
+    backend: Backend,
+    first: _FirstPass,
+    canvas: Canvas,
+    low_column: Any,
+    columns: Any,
+    low_row: Any,
+    rows: Any,
+    eye: Any,
+    depth_range: Any,
+    wanted: Any,
+) -> tuple[Any, Any, Any]:
+    """Counts the admissible pixels of a window in row-major order, up to number `wanted`; returns the count before
+    it, and its column and row."""
+    width = dr.width(low_column)
+    count = dr.zeros(backend.UInt32, width)
+    column, row = low_column + 0, low_row + 0
+    wanted = dr.full(backend.UInt32, 0, width) + wanted
+    searching = dr.full(backend.Bool, True, width)
+    while dr.hint(searching, label="count the window", exclude=[backend, first, canvas]):
+        fits = _admissible(backend, first, canvas, column, row, eye, depth_range)
+        here = fits & (count == wanted)
+        count += dr.select(fits & ~here, backend.UInt32(1), 0)
+        last_column = column + 1 == low_column + columns
+        last = last_column & (row + 1 == low_row + rows)
+        searching = ~here & ~last
+        column = dr.select(searching, dr.select(last_column, low_column, column + 1), column)
+        row = dr.select(searching & last_column, row + 1, row)
+    return count, column, row

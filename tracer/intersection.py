@@ -1,0 +1,268 @@
+"""What a ray meets: the nearest hit, what hides a light, and the surface at a hit.
+
+The same three functions serve the camera, the ray queries, the accuracy suite and the viewer; none of them knows
+where its rays come from.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+
+from tracer.acceleration.departure import Departure
+from tracer.acceleration.traverse import visit_triangles
+from tracer.acceleration.triangle import TriangleTest, gather_triangle
+from tracer.backends import INVALID
+from tracer.device_scene import MESH, PLANE, SPHERE, DeviceScene
+from tracer.ray import Hit, Ray, Segment, departure_word, keep_nearer, no_hit, normalize, select_max
+from tracer.shapes.plane import PlaneSlot
+from tracer.shapes.sphere import SphereSlot
+
+ANALYTIC_SURFACES = {PLANE: PlaneSlot.surface, SPHERE: SphereSlot.surface}
+
+
+@dataclass
+class Surface:
+    """The surface at n hits.
+
+    `p`: the hit point, moved onto the surface; `outward`: geometric unit normal; `normal`: shading normal that faces
+    the ray; `entering`: the ray comes from the side that `outward` points to; `lit_side`: geometric normal facing the
+    ray; `shape`, `primitive`, `texture`, `plane_bit`: ids.
+    """
+
+    p: Any
+    outward: Any
+    normal: Any
+    lit_side: Any
+    entering: Any
+    shape: Any
+    primitive: Any
+    texture: Any
+    plane_bit: Any
+
+
+def free_ray(scene: DeviceScene, o: Any, d: Any) -> Ray:
+    """A ray that starts anywhere: it leaves nothing, and its sides are computed."""
+    backend = scene.backend
+    width = max(dr.width(o), dr.width(d))
+    return Ray(o, d, dr.full(backend.UInt32, INVALID, width), plane_sides(scene, o, d))
+
+
+def plane_sides(scene: DeviceScene, o: Any, d: Any) -> Any:
+    """The bits of `Ray.sides` for origins (3, n)."""
+    sides = dr.zeros(scene.backend.UInt32, max(dr.width(o), dr.width(d)))
+    for slot in scene.slots:
+        if isinstance(slot, PlaneSlot) and slot.bit is not None:
+            sides = sides | slot.side_bit(o, d)
+    return sides
+
+
+def closest_hit(scene: DeviceScene, ray: Ray, active: Any, t_max: Any = None) -> Hit:
+    """The smallest t > 0 (below `t_max` when given); of equal ones the lower shape, then the lower primitive."""
+    hit = no_hit(scene.backend, dr.width(ray.d))
+    if t_max is not None:
+        hit.t = dr.select(active, t_max, hit.t)
+    for slot in scene.slots:
+        hit = slot.closest(ray, hit, active)
+    if scene.sphere_table is not None:
+        hit = scene.sphere_table.closest(ray, hit, active)
+    if scene.triangles is not None:
+        hit = visit_triangles(
+            scene.backend,
+            scene.triangles,
+            ray,
+            departure(scene, ray),
+            state=hit,
+            limit=lambda hit: hit.t,
+            visit=lambda hit, t, primitive, _test, valid: keep_nearer(hit, t, valid, primitive),
+            active=active,
+        )
+    return Hit(hit.t, dr.select(active, hit.primitive, INVALID))
+
+
+def hidden(scene: DeviceScene, segment: Segment, active: Any) -> Any:
+    """Mask: some shape lies strictly between the shaded point and the light (document, section 4)."""
+    blocked = ~active
+    for slot in scene.slots:
+        blocked = blocked | slot.blocks(segment, active)
+    if scene.sphere_table is not None:
+        blocked = blocked | scene.sphere_table.blocks(segment, active & ~blocked)
+    if scene.triangles is not None:
+        never = scene.backend.Float(-1)
+        blocked = visit_triangles(
+            scene.backend,
+            scene.triangles,
+            segment.ray,
+            departure(scene, segment.ray),
+            state=blocked,
+            limit=lambda blocked: dr.select(blocked, never, segment.length),
+            visit=lambda blocked, _t, _primitive, test, valid: blocked
+            | (valid & ~_holds_light(segment, test)),
+            active=~blocked,
+        )
+    return blocked & active
+
+
+def transmittance(scene: DeviceScene, segment: Segment, active: Any) -> Any:
+    """Share of light that arrives when every surface crossed lets k_t through (`transparent_shadows`)."""
+    backend = scene.backend
+    share = dr.select(active, backend.Float(1), 0)
+    for slot in scene.slots:
+        count = slot.crossings(segment, active)
+        share = share * _power_0_1_2(_refraction_of(scene, slot.primitive), count)
+    if scene.sphere_table is not None:
+        share = scene.sphere_table.fold(
+            share,
+            active,
+            lambda share, slot: share
+            * _power_0_1_2(_refraction_of(scene, slot.primitive), slot.crossings(segment, active)),
+            lambda share: share > 0,
+        )
+    if scene.triangles is not None:
+        never = backend.Float(-1)
+        share = visit_triangles(
+            backend,
+            scene.triangles,
+            segment.ray,
+            departure(scene, segment.ray),
+            state=share,
+            limit=lambda share: dr.select(share > 0, segment.length, never),
+            visit=lambda share, _t, primitive, test, valid: dr.select(
+                valid & ~_holds_light(segment, test), share * _refraction_of(scene, primitive), share
+            ),
+            active=active,
+        )
+    return share
+
+
+def _holds_light(segment: Segment, test: TriangleTest) -> Any:
+    """Mask: the light lies on the triangle's plane within rounding, so the triangle does not hide it."""
+    return dr.abs(test.height + segment.length * test.speed) <= test.slack
+
+
+def _refraction_of(scene: DeviceScene, primitive: Any) -> Any:
+    return dr.gather(scene.backend.Float, scene.materials, shape_of(scene, primitive, True) * 8 + 2)
+
+
+def _power_0_1_2(factor: Any, count: Any) -> Any:
+    return dr.select(count == 0, 1, dr.select(count == 1, factor, factor * factor))
+
+
+def shape_of(scene: DeviceScene, primitive: Any, active: Any) -> Any:
+    """Number of the shape that a primitive belongs to; without meshes they are the same."""
+    if scene.shape_of is None:
+        return primitive
+    return dr.gather(scene.backend.UInt32, scene.shape_of, primitive, active)
+
+
+def surface_at(scene: DeviceScene, ray: Ray, hit: Hit, active: Any) -> Surface:
+    """The surface at the hits of rays; lanes without a hit hold nothing of use."""
+    backend = scene.backend
+    active = active & hit.valid
+    shape = shape_of(scene, hit.primitive, active)
+    ids = dr.gather(backend.IdVector4, scene.ids, shape, active)
+    p = dr.fma(hit.t, ray.d, ray.o)
+    p, outward = _geometry_at(scene, ids.x, shape, hit.primitive, p, active)
+    entering = dr.dot(outward, ray.d) < 0
+    lit_side = dr.select(entering, outward, -outward)
+    normal = lit_side
+    if scene.smooth is not None:
+        normal = _smooth_normal(scene, shape, hit.primitive, p, ray.d, lit_side, entering, active)
+    return Surface(p, outward, normal, lit_side, entering, shape, hit.primitive, ids.y, ids.z)
+
+
+def _geometry_at(
+    scene: DeviceScene, kind: Any, shape: Any, primitive: Any, p: Any, active: Any
+) -> tuple[Any, Any]:
+    """Points moved onto their surfaces along the normal, and the outward unit normals there."""
+    backend = scene.backend
+    row = dr.gather(backend.Vector4, scene.geometry, shape, active)
+    point, normal = p, backend.Vector3(0, 0, 1)
+    for analytic, surface in ANALYTIC_SURFACES.items():
+        if analytic in scene.kinds:
+            p_k, n_k = surface(row, p)
+            point, normal = dr.select(kind == analytic, p_k, point), dr.select(kind == analytic, n_k, normal)
+    if scene.triangles is not None:
+        is_mesh = active & (kind == MESH)
+        triangle = gather_triangle(
+            backend, scene.triangles.triangles, _triangle_index(scene, primitive, is_mesh), is_mesh
+        )
+        height = dr.dot(triangle.normal, p - triangle.v0)
+        point = dr.select(is_mesh, dr.fma(-height, triangle.normal, p), point)
+        normal = dr.select(is_mesh, triangle.normal, normal)
+    return point, normal
+
+
+def _triangle_index(scene: DeviceScene, primitive: Any, active: Any) -> Any:
+    return dr.gather(scene.backend.UInt32, scene.triangle_of, primitive, active)
+
+
+def _smooth_normal(
+    scene: DeviceScene,
+    shape: Any,
+    primitive: Any,
+    p: Any,
+    d: Any,
+    lit_side: Any,
+    entering: Any,
+    active: Any,
+) -> Any:
+    """The interpolated vertex normal on the lit side; the geometric one where it would face away from the ray."""
+    assert scene.smooth is not None and scene.triangles is not None
+    backend = scene.backend
+    wanted = dr.gather(backend.UInt32, scene.smooth.shapes, shape, active)
+    active = active & (wanted == 1)
+    index = _triangle_index(scene, primitive, active)
+    triangle = gather_triangle(backend, scene.triangles.triangles, index, active)
+    normals = gather_triangle(backend, scene.smooth.normals, index, active)
+    b1, b2 = barycentrics(triangle.v0, triangle.v1, triangle.v2, p)
+    mixed = normalize((1 - b1 - b2) * normals.v0 + b1 * normals.v1 + b2 * normals.v2)
+    mixed = dr.select(entering, mixed, -mixed)
+    usable = active & (dr.dot(mixed, d) < 0)
+    return dr.select(usable, mixed, lit_side)
+
+
+def barycentrics(v0: Any, v1: Any, v2: Any, p: Any) -> tuple[Any, Any]:
+    """Weights of v1 and v2 at a point p of the triangle, by areas projected on the normal (document, section 5.9)."""
+    e1, e2, q = v1 - v0, v2 - v0, p - v0
+    cross = dr.cross(e1, e2)
+    area2 = dr.squared_norm(cross)
+    return dr.dot(dr.cross(q, e2), cross) / area2, dr.dot(dr.cross(e1, q), cross) / area2
+
+
+def departure(scene: DeviceScene, ray: Ray) -> Departure:
+    """What rays know of the surface that they leave, looked up by its id."""
+    backend = scene.backend
+    active = ray.departing
+    primitive = ray.departure >> 1
+    shape = shape_of(scene, primitive, active)
+    kind = dr.gather(backend.IdVector4, scene.ids, shape, active).x
+    row = dr.gather(backend.Vector4, scene.geometry, shape, active)
+    center = backend.Vector3(row.x, row.y, row.z)
+    is_mesh = active & (kind == MESH)
+    assert scene.triangles is not None
+    triangle = gather_triangle(
+        backend, scene.triangles.triangles, _triangle_index(scene, primitive, is_mesh), is_mesh
+    )
+    outward = dr.select(
+        is_mesh, triangle.normal, dr.select(kind == SPHERE, normalize(ray.o - center), center)
+    )
+    normal = dr.select(ray.inside, -outward, outward)
+    climb = dr.dot(normal, ray.d)
+    return Departure(
+        active=active,
+        primitive=primitive,
+        normal=normal,
+        reference=dr.select(is_mesh, triangle.centroid(), center),
+        has_reference=active & (kind != PLANE),
+        climb=select_max(climb, backend.Float(0)),
+    )
+
+
+def leave(ray: Ray, surface: Surface, d: Any, crosses: bool) -> Ray:
+    """The ray that leaves a surface in direction d: on the side it came from, or through it."""
+    inside = surface.entering if crosses else ~surface.entering
+    sides = ray.sides ^ surface.plane_bit if crosses else ray.sides
+    return Ray(surface.p, d, departure_word(surface.primitive, inside), sides)

@@ -1,0 +1,73 @@
+"""Many spheres: a loop over a table, where unrolled code would grow with every sphere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from tracer.backends import Backend
+from tracer.ray import Hit, Ray, Segment, keep_nearer
+from tracer.shapes.sphere import SphereSlot, contact_margin
+
+
+@dataclass
+class SphereTable:
+    """`rows`: 4 floats a sphere (center, radius); `margins`, `primitives`: one each; `count`: width-1."""
+
+    backend: Backend
+    rows: Any
+    margins: Any
+    primitives: Any
+    count: Any
+
+    @staticmethod
+    def of(backend: Backend, rows: list[np.ndarray], primitives: list[int]) -> SphereTable:
+        """The table of n spheres with `rows` (n, 4) and their primitive ids."""
+        return SphereTable(
+            backend,
+            backend.table(rows),
+            backend.table([contact_margin(row, backend.epsilon) for row in rows]),
+            backend.id_table(primitives),
+            backend.opaque_id(len(rows)),
+        )
+
+    def closest(self, ray: Ray, hit: Hit, active: Any) -> Hit:
+        """The nearest of `hit` and all spheres."""
+        return self.fold(
+            hit, active, lambda hit, s: keep_nearer(hit, *s.hit(ray), s.primitive), lambda hit: True
+        )
+
+    def blocks(self, segment: Segment, active: Any) -> Any:
+        """Mask: a sphere lies strictly between the two ends."""
+        start = dr.full(self.backend.Bool, False, dr.width(segment.length))
+        return self.fold(
+            start, active, lambda blocked, s: blocked | s.blocks(segment, active), lambda blocked: ~blocked
+        )
+
+    def fold(self, state: Any, active: Any, step: Callable[..., Any], unfinished: Callable[..., Any]) -> Any:
+        """step(... step(step(state, sphere 0), sphere 1) ...), ended early where `unfinished` says no."""
+
+        def body(i: Any, state: Any) -> tuple[Any, Any]:
+            return i + 1, step(state, self._slot(i))
+
+        index = dr.select(active, dr.zeros(self.backend.UInt32, dr.width(active)), self.count)
+        _, state = dr.while_loop(
+            state=(index, state),
+            cond=lambda i, state: (i < self.count) & unfinished(state),
+            body=body,
+            label="spheres",
+        )
+        return state
+
+    def _slot(self, i: Any) -> SphereSlot:
+        row = dr.gather(self.backend.Vector4, self.rows, i)
+        return SphereSlot(
+            center=self.backend.Vector3(row.x, row.y, row.z),
+            radius=row.w,
+            margin=dr.gather(self.backend.Float, self.margins, i),
+            primitive=dr.gather(self.backend.UInt32, self.primitives, i),
+        )

@@ -1,0 +1,75 @@
+"""Which lane owns which pixel: 8x8 tiles in Morton order, row of tiles by row of tiles.
+
+Neighboring lanes then trace neighboring rays. A picture is launched in bands of whole tile rows; no band decides
+anything about a pixel, so every band height gives the same picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+
+from tracer.backends import Backend
+
+TILE = 8
+_PIXELS = TILE * TILE
+
+Rectangle = tuple[int, int, int, int]
+"""x0, y0, x1, y1 in pixels of the full picture, end exclusive."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """Rows y0 .. y1 - 1 of a rectangle of the picture."""
+
+    x0: int
+    y0: int
+    x1: int
+    y1: int
+
+    @property
+    def width(self) -> int:
+        """Columns."""
+        return self.x1 - self.x0
+
+    @property
+    def height(self) -> int:
+        """Rows."""
+        return self.y1 - self.y0
+
+
+def bands(rectangle: Rectangle, sub_rays: int, rays_per_band: int) -> Iterator[Band]:
+    """Cuts a rectangle into bands of whole tile rows with about so many primary rays each, one tile row at least."""
+    x0, y0, x1, y1 = rectangle
+    rays_per_tile_row = _tiles_across(x1 - x0) * _PIXELS * sub_rays
+    height = max(1, rays_per_band // rays_per_tile_row) * TILE
+    for top in range(y0, y1, height):
+        yield Band(x0, top, x1, min(top + height, y1))
+
+
+def _tiles_across(width: int) -> int:
+    """Tiles in a row: two at least, which the division by multiplication below needs."""
+    return max(2, -(-width // TILE))
+
+
+def lane_pixels(backend: Backend, band: Band) -> tuple[Any, Any, Any]:
+    """Column and row within the band of every lane, and the mask of lanes that own a pixel."""
+    across = _tiles_across(band.width)
+    lanes = across * -(-band.height // TILE) * _PIXELS
+    lane = dr.arange(backend.UInt32, lanes)
+    tile, place = lane >> 6, lane & (_PIXELS - 1)
+    # tile // across as a multiplication: exact while tiles times across stays below 2^32, as a band's do
+    tile_row = dr.mul_hi(tile, backend.opaque_id(-(-(2**32) // across)))
+    tile_column = tile - tile_row * backend.opaque_id(across)
+    column = (tile_column << 3) + _even_bits(place)
+    row = (tile_row << 3) + _even_bits(place >> 1)
+    active = (column < backend.opaque_id(band.width)) & (row < backend.opaque_id(band.height))
+    return column, row, active
+
+
+def _even_bits(place: Any) -> Any:
+    """Bits 0, 2, 4 of a number below 64, side by side (Morton order)."""
+    return (place & 1) | ((place >> 1) & 2) | ((place >> 2) & 4)

@@ -1,0 +1,190 @@
+"""Whitted's recursion as one loop (document, sections 2 and 3): every pixel's tree of rays, depth first.
+
+One lane owns one pixel. It traces a ray, adds the light of the surface, goes on with one child and keeps the other
+on a stack; when the stack is empty it takes the pixel's next sub-ray, so no lane waits for its neighbors. Because the
+pending rays of a pixel weigh at most 1 together and at least the cut-off each, the stack is short.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import drjit as dr
+
+from tracer.backends import INVALID, Backend
+from tracer.canvas import DeviceCanvas
+from tracer.device_scene import DeviceScene
+from tracer.direct_light import direct_light
+from tracer.intersection import Surface, closest_hit, free_ray, surface_at
+from tracer.path import make_path, path_type
+from tracer.spawn import material_at, spawn
+from tracer.textures.tables import texture_color, texture_row
+
+
+@dataclass
+class PixelGrid:
+    """The pixels of a launch: `column`, `row` (n,) whole numbers, `number` (n,) row times width plus column of the full
+    picture, `n`: a pixel is the mean of n x n sub-rays (width 1), `active`: the lane owns a pixel."""
+
+    column: Any
+    row: Any
+    number: Any
+    n: Any
+    active: Any
+
+
+@dataclass
+class PixelColumns:
+    """What the loop finds for n pixels: mean `color` (3, n), `coverage` (share of sub-rays that hit), and of the
+    nearest sub-ray `depth` (-1: none), `primitive` and `sub_ray`; `counts`: rays by kind."""
+
+    color: Any
+    coverage: Any
+    depth: Any
+    primitive: Any
+    sub_ray: Any
+    counts: Counts
+
+
+@dataclass
+class Counts:
+    """Rays of a pixel by kind, and why its paths ended (n,)."""
+
+    shadow: Any
+    reflected: Any
+    refracted: Any
+    total_reflection: Any
+    total_internal: Any
+    ended_by_cutoff: Any
+    ended_by_depth: Any
+    deepest_level: Any
+
+    @staticmethod
+    def zero(backend: Backend, width: int) -> Counts:
+        """Counters in full width, each with memory of its own."""
+        return Counts(*(dr.zeros(backend.UInt32, width) for _ in fields(Counts)))
+
+
+@dr.syntax
+def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid) -> PixelColumns:
+    """The colors, depths and ray counts of pixels."""
+    # ---- Loop state, all of it in full width ----
+    backend = scene.backend
+    width = dr.width(pixels.number)
+    path = dr.zeros(path_type(backend), width)  # the ray in hand
+    fresh = dr.full(backend.Bool, True, width)  # ... is still to be made from the next sub-ray
+    sub_ray = dr.zeros(backend.UInt32, width)  # number of the current sub-ray
+    stack = dr.alloc_local(path_type(backend), scene.stack_size)  # rays that wait
+    top = dr.zeros(backend.UInt32, width)  # how many of them
+    color = dr.zeros(backend.Vector3, width)  # sum over the sub-rays
+    hits = dr.zeros(backend.UInt32, width)  # sub-rays that hit something
+    depth = dr.full(backend.Float, float("inf"), width)  # of the nearest sub-ray
+    nearest = dr.full(backend.UInt32, INVALID, width)  # its primitive
+    nearest_sub_ray = dr.zeros(backend.UInt32, width)  # its number
+    counts = Counts.zero(backend, width)
+    active = backend.Bool(pixels.active)
+
+    while dr.hint(active, label="whitted", exclude=[scene, canvas, pixels, backend]):
+        # ---- The next sub-ray of the pixel ----
+        if dr.hint(fresh, exclude=[scene, canvas, pixels, backend]):
+            path = _primary(scene, canvas, pixels, sub_ray)
+
+        # ---- The nearest surface ----
+        hit = closest_hit(scene, path.ray, active)
+        surface = surface_at(scene, path.ray, hit, active)
+        found = active & hit.valid
+        counts.deepest_level = dr.maximum(counts.deepest_level, path.level)
+        is_primary = path.level == 0
+        closer = is_primary & found & (hit.t < depth)
+        hits += dr.select(is_primary & found, backend.UInt32(1), 0)
+        depth = dr.select(closer, hit.t, depth)
+        nearest = dr.select(closer, hit.primitive, nearest)
+        nearest_sub_ray = dr.select(closer, sub_ray, nearest_sub_ray)
+
+        # ---- Its own light, or the background ----
+        row = texture_row(backend, scene.textures, surface.texture, found)
+        own = texture_color(backend, scene.textures, row, texture_point(scene, surface, found), found)
+        material = material_at(scene, surface, found)
+        light, shadow_rays = direct_light(
+            scene, path.ray, surface, material.finish, pixels.number, sub_ray, found
+        )
+        counts.shadow += shadow_rays
+        base = path.throughput * own
+        local = base * dr.fma(scene.not_ambient * material.absorption, light, scene.ambient)
+        sees_background = active & ~hit.valid
+        if dr.hint(not scene.options.secondary_background, mode="scalar"):
+            sees_background &= is_primary
+        color += dr.select(found, local, 0)
+        color += dr.select(sees_background, path.throughput * scene.background, 0)
+
+        # ---- Its children ----
+        children = spawn(scene, path, surface, material, base * scene.not_ambient, found)
+        reflects, refracts = children.reflects, children.refracts
+        counts.reflected += dr.select(reflects, backend.UInt32(1), 0)
+        counts.refracted += dr.select(refracts & ~children.total, backend.UInt32(1), 0)
+        counts.total_reflection += dr.select(refracts & children.total, backend.UInt32(1), 0)
+        counts.total_internal += dr.select(children.total, backend.UInt32(1), 0)
+        counts.ended_by_cutoff += children.ended_by_cutoff
+        counts.ended_by_depth += children.ended_by_depth
+
+        # ---- Go on with one of them, or one that waits, or the next sub-ray ----
+        path = dr.select(refracts, children.refracted, children.reflected)
+        if dr.hint(reflects & refracts, exclude=[scene, canvas, pixels, backend]):
+            stack.write(children.reflected, top)
+            top += 1
+        pops = active & ~reflects & ~refracts & (top > 0)
+        if dr.hint(pops, exclude=[scene, canvas, pixels, backend]):
+            top -= 1
+            path = stack.read(top)
+        fresh = active & ~reflects & ~refracts & ~pops
+        sub_ray += dr.select(fresh, backend.UInt32(1), 0)
+        active &= sub_ray < pixels.n * pixels.n
+
+    share = dr.rcp(backend.Float(pixels.n * pixels.n))
+    return PixelColumns(
+        color=color * share,
+        coverage=backend.Float(hits) * share,
+        depth=dr.select(hits > 0, depth, -1),
+        primitive=nearest,
+        sub_ray=nearest_sub_ray,
+        counts=counts,
+    )
+
+
+def _primary(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, sub_ray: Any) -> Any:
+    """The path of a pixel's sub-ray b n + a, through (i + (a + offset)/n, j + (b + offset)/n)."""
+    backend = scene.backend
+    o, d = primary_ray(backend, canvas, pixels, sub_ray)
+    width = dr.width(d)
+    return make_path(
+        backend,
+        free_ray(scene, o, d),
+        dr.full(backend.Float, 1, width),
+        dr.full(backend.Vector3, 1, width),
+        dr.zeros(backend.UInt32, width),
+    )
+
+
+def primary_ray(
+    backend: Backend, canvas: DeviceCanvas, pixels: PixelGrid, sub_ray: Any
+) -> tuple[Any, Any]:
+    """Origin and direction of a sub-ray (document, section 7)."""
+    b = sub_ray // pixels.n
+    a = sub_ray - b * pixels.n
+    n = backend.Float(pixels.n)
+    column = backend.Float(pixels.column) + (backend.Float(a) + canvas.offset) / n
+    row = backend.Float(pixels.row) + (backend.Float(b) + canvas.offset) / n
+    return canvas.ray(column, row)
+
+
+def texture_point(scene: DeviceScene, surface: Surface, active: Any) -> Any:
+    """The argument of the texture: the world point, or the point before the shape's own transform."""
+    if scene.object_space is None:
+        return surface.p
+    backend = scene.backend
+    rows = [
+        dr.gather(backend.Vector4, scene.object_space, surface.shape * 3 + k, active) for k in range(3)
+    ]
+    p = surface.p
+    return backend.Vector3(*(dr.fma(r.x, p.x, dr.fma(r.y, p.y, dr.fma(r.z, p.z, r.w))) for r in rows))
