@@ -669,8 +669,7 @@ def leave(world: World, ray: Ray, hit: Hit, direction: Vec, side: Vec) -> Ray:
     if dot(direction, side) < 0 and isinstance(world.shapes[hit.shape].geometry, Mesh):
         side = -side  # a smooth normal may send a ray through the facet; it is traced as it is
     bound = rounding_bound(world, ray.o, hit.position)
-    has_moved = ray.start is None or hit.t > ray.start.bound
-    view = -ray.d if has_moved or ray.start is None else ray.start.view
+    view = ray.start.view if ray.start and hit.t <= ray.start.bound else -ray.d
     return Ray(hit.position, direction, Start(hit.shape, hit.primitive, side, view, bound))
 
 

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from typing import Any
 
 import drjit as dr
-import numpy as np
 
 from tracer.canvas import DeviceCanvas
 from tracer.device_scene import DeviceScene
 from tracer.intersection import Surface, free_ray, surface_at
 from tracer.ray import Hit
-from tracer.textures.tables import PICTURE, texture_row
+from tracer.spawn import material_at
+from tracer.textures.tables import PICTURE, picture_coordinates
 from tracer.whitted import PixelColumns, PixelGrid, primary_ray, texture_point
 
 Layer = Callable[[DeviceScene, Surface, Any, Any], Any]
@@ -29,15 +29,19 @@ def _shape(scene: DeviceScene, surface: Surface, primitive: Any, found: Any) -> 
 
 def _primitive(scene: DeviceScene, surface: Surface, primitive: Any, found: Any) -> Any:
     backend = scene.backend
-    first = dr.gather(backend.IdVector4, scene.ids, surface.shape, found).w
+    first = dr.gather(backend.UInt32, scene.first_primitive, surface.shape, found)
     return dr.select(found, backend.Int32(primitive - first), -1)
 
 
 def _uv(scene: DeviceScene, surface: Surface, primitive: Any, found: Any) -> Any:
-    row = texture_row(scene.backend, scene.textures, surface.texture, found)
-    u, v = row.coordinates(texture_point(scene, surface, found))
+    nothing = scene.backend.Vector2(float("nan"))
+    if PICTURE not in scene.textures.kinds:
+        return dr.select(found, nothing, nothing)
+    row = material_at(scene, surface, found).texture
     has_picture = found & (row.kind == PICTURE)
-    return scene.backend.Vector2(*(dr.select(has_picture, c, float("nan")) for c in (u, v)))
+    point = texture_point(scene, surface, found)
+    uv = picture_coordinates(scene.backend, scene.textures, row, point, has_picture)
+    return dr.select(has_picture, uv, nothing)
 
 
 LAYERS: dict[str, Layer] = {
@@ -62,9 +66,3 @@ def compute_layers(
     surface = surface_at(scene, ray, Hit(found.depth, found.primitive), valid)
     return {name: LAYERS[name](scene, surface, found.primitive, valid) for name in names}
 
-
-def empty_layer(name: str, height: int, width: int, dtype: Any) -> np.ndarray:
-    """Memory for a layer of the picture."""
-    if name in ("shape", "primitive"):
-        return np.empty((height, width), np.int64)
-    return np.empty((height, width, 2 if name == "uv" else 3), dtype)

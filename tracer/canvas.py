@@ -120,14 +120,15 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 class DeviceCanvas:
     """A canvas in a kernel: width-1 numbers that kernels read from memory.
 
-    `center` K, `x`, `y`: steps of one pixel along X and Y, `forward`: dis f, `half_width`, `half_height` in pixels,
-    `offset` delta.
+    `center` K, `x`, `y`: steps of one pixel along X and Y, `forward`: dis f, `axis`: f, `half_width`, `half_height` in
+    pixels, `offset` delta.
     """
 
     center: Any
     x: Any
     y: Any
     forward: Any
+    axis: Any
     half_width: Any
     half_height: Any
     offset: Any
@@ -140,6 +141,7 @@ class DeviceCanvas:
             x=backend.opaque_vector(canvas.x * canvas.pixel_size),
             y=backend.opaque_vector(canvas.y * canvas.pixel_size),
             forward=backend.opaque_vector(canvas.forward * canvas.distance),
+            axis=backend.opaque_vector(canvas.forward),
             half_width=backend.opaque(canvas.width / 2),
             half_height=backend.opaque(canvas.height / 2),
             offset=backend.opaque(canvas.offset),

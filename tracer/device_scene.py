@@ -6,7 +6,6 @@ memory, so moving a sphere or changing a color compiles nothing new.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -26,9 +25,12 @@ from tracer.shapes.sphere_table import SphereTable
 from tracer.shapes.triangles import MeshData, PlacedMesh, place_mesh, read_mesh
 from tracer.textures import Solid
 from tracer.textures.picture import read_picture
-from tracer.textures.tables import TextureTables, pack_textures
+from tracer.textures.tables import PackedTexture, TexturePacker, TextureTables
 
 PLANE, SPHERE, MESH = range(3)
+
+KIND_UNIT = 256
+"""The kind of a shape stands above the texture flags in one word."""
 
 UNROLLED_SPHERES = 32
 """Up to so many spheres stand in the kernel one by one; more are looped over."""
@@ -70,10 +72,10 @@ class DeviceScene:
     """A scene in Dr.Jit memory, for one backend and precision.
 
     `slots`: planes and spheres that stand in the kernel one by one, in the order of the shapes; `sphere_table`: all
-    spheres when they are many; `triangles`: those of all meshes. Tables by shape: `geometry` (4 floats: plane n, d or
-    sphere center, radius), `ids` (kind, texture, plane bit, first primitive), `materials` (8 floats: ior, k_r, k_t, m,
-    h, s, k_a, 0), `object_space` (12 floats: the 3x4 matrix back). By primitive, when there are meshes: `shape_of`,
-    `triangle_of`.
+    spheres when they are many; `triangles`: those of all meshes. Tables by shape, in packets of four: `geometry` (plane
+    n, d or sphere center, radius), `ids` (shape kind times 256 plus texture flags, first color, count of colors, plane
+    bit), `surfaces` (ior, k_r, k_t, k_a; m, h, s, texture rate), `object_space` (the 3x4 matrix back), `first_primitive` (one each). By primitive,
+    when there are meshes: `shape_of`, `triangle_of`.
     """
 
     backend: Backend
@@ -87,7 +89,8 @@ class DeviceScene:
     triangle_of: Any
     geometry: Any
     ids: Any
-    materials: Any
+    first_primitive: Any
+    surfaces: Any
     object_space: Any
     textures: TextureTables
     lights: LightTables
@@ -111,8 +114,8 @@ def compile_scene(scene: Scene, backend: Backend) -> DeviceScene:
     host = HostScene(first, meshes, _extent(scene, meshes))
     decode = decode_srgb if scene.color_space == "linear" else np.asarray
     slots, sphere_table, planes = _analytic_shapes(scene, backend, first)
-    textures, texture_of = _textures(scene, backend, decode)
-    materials = np.array([_material_row(scene, shape) for shape in scene.shapes]).reshape(-1, 8)
+    packer = TexturePacker(scene.literal, decode, lambda file: read_picture(scene.resolve(file)))
+    textures = _textures(scene, packer)
     return DeviceScene(
         backend=backend,
         options=Options(
@@ -129,10 +132,11 @@ def compile_scene(scene: Scene, backend: Backend) -> DeviceScene:
         shape_of=backend.id_table(np.repeat(np.arange(len(counts)), counts)) if meshes else None,
         triangle_of=backend.id_table(_triangle_numbers(counts, meshes)) if meshes else None,
         geometry=backend.table(_geometry_rows(scene)),
-        ids=backend.id_table(_id_rows(scene, texture_of, first)),
-        materials=backend.table(materials if len(materials) else np.zeros(8)),
+        ids=backend.id_table(_id_rows(scene, textures)),
+        first_primitive=backend.id_table(first[:-1] if len(first) > 1 else [0]),
+        surfaces=backend.table(_surface_rows(scene, textures)),
         object_space=_object_space(scene, backend),
-        textures=textures,
+        textures=packer.tables(backend, textures),
         lights=compile_lights(
             backend,
             scene.lights,
@@ -188,15 +192,15 @@ def _geometry_rows(scene: Scene) -> np.ndarray:
     return rows
 
 
-def _id_rows(scene: Scene, texture_of: list[int], first: np.ndarray) -> np.ndarray:
+def _id_rows(scene: Scene, textures: list[PackedTexture]) -> np.ndarray:
     rows = np.zeros((max(1, len(scene.shapes)), 4), np.int64)
     planes = 0
-    for i, shape in enumerate(scene.shapes):
+    for i, (shape, texture) in enumerate(zip(scene.shapes, textures, strict=True)):
         bit = 0
         if isinstance(shape, Plane):
             bit = 1 << planes if planes < SIDE_BITS else 0
             planes += 1
-        rows[i] = _kind(shape), texture_of[i], bit, first[i]
+        rows[i] = _kind(shape) * KIND_UNIT + texture.flags, texture.first, texture.count, bit
     return rows
 
 
@@ -212,37 +216,28 @@ def _inherited(scene: Scene, shape: ShapeRecord, key: str) -> Any:
     return getattr(source_of(scene, shape), key) if own is None else own
 
 
-def _material_row(scene: Scene, shape: ShapeRecord) -> list[float]:
-    name = _inherited(scene, shape, "material")
-    m = Material() if name is None else scene.materials[name]
-    return [m.ior, m.reflection, m.refraction, m.diffuse, m.specular, m.shininess, m.absorption, 0.0]
+def _surface_rows(scene: Scene, textures: list[PackedTexture]) -> np.ndarray:
+    rows = np.zeros((max(1, len(scene.shapes)), 8))
+    for i, (shape, texture) in enumerate(zip(scene.shapes, textures, strict=True)):
+        name = _inherited(scene, shape, "material")
+        m = Material() if name is None else scene.materials[name]
+        rows[i, :4] = m.ior, m.reflection, m.refraction, m.absorption
+        rows[i, 4:] = m.diffuse, m.specular, m.shininess, texture.rate
+    return rows
 
 
-def _textures(
-    scene: Scene, backend: Backend, decode: Callable[[np.ndarray], np.ndarray]
-) -> tuple[TextureTables, list[int]]:
-    """The tables, and the number of each shape's texture: the named ones first, then one per color."""
-    names = list(scene.textures)
-    records = list(scene.textures.values())
-    solids: dict[tuple[float, float, float], int] = {}
-    texture_of = []
+def _textures(scene: Scene, packer: TexturePacker) -> list[PackedTexture]:
+    """The texture of each shape; shapes that share one share its colors."""
+    packed: dict[Any, PackedTexture] = {}
+    result = []
     for shape in scene.shapes:
         has_own = shape.texture is not None or shape.color is not None
         look = shape if has_own else source_of(scene, shape)
-        if look.texture is not None:
-            texture_of.append(names.index(look.texture))
-            continue
-        color = (1.0, 1.0, 1.0) if look.color is None else look.color
-        if color not in solids:
-            solids[color] = len(records)
-            records.append(Solid(color=color))
-        texture_of.append(solids[color])
-    if not records:
-        records.append(Solid(color=(1.0, 1.0, 1.0)))
-    tables = pack_textures(
-        backend, records, scene.literal, decode, lambda file: read_picture(scene.resolve(file))
-    )
-    return tables, texture_of
+        key = look.texture if look.texture is not None else look.color or (1.0, 1.0, 1.0)
+        if key not in packed:
+            packed[key] = packer.pack(scene.textures[key] if isinstance(key, str) else Solid(color=key))
+        result.append(packed[key])
+    return result
 
 
 def _placed_meshes(scene: Scene) -> dict[int, PlacedMesh]:

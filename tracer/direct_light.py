@@ -78,7 +78,8 @@ def sample_terms(
         lit = lit & (dr.dot(surface.lit_side, l) > 0)
     mirrored = 2 * cosine * -dr.dot(surface.normal, ray.d) + dr.dot(l, ray.d)
     mirrored = dr.select(mirrored > 0, mirrored, 0)
-    highlight = _power(mirrored, finish.shininess, lit & (finish.specular > 0))
+    matters = lit & (finish.specular > 0) & ((mirrored > 0) | (finish.shininess == 0))
+    highlight = _power(mirrored, finish.shininess, matters)
     diffuse = cosine if scene.options.diffuse_is_lambert else mirrored
     local = dr.fma(finish.diffuse, diffuse, finish.specular * highlight)
     segment = Segment(leave(ray, surface, l, crosses=False), length, sample.sides, sample.decided)

@@ -15,7 +15,7 @@ from tracer.acceleration.departure import Departure
 from tracer.acceleration.traverse import visit_triangles
 from tracer.acceleration.triangle import TriangleTest, gather_triangle
 from tracer.backends import INVALID
-from tracer.device_scene import MESH, PLANE, SPHERE, DeviceScene
+from tracer.device_scene import KIND_UNIT, MESH, PLANE, SPHERE, DeviceScene
 from tracer.ray import Hit, Ray, Segment, departure_word, keep_nearer, no_hit, normalize, select_max
 from tracer.shapes.plane import PlaneSlot
 from tracer.shapes.sphere import SphereSlot
@@ -29,7 +29,7 @@ class Surface:
 
     `p`: the hit point, moved onto the surface; `outward`: geometric unit normal; `normal`: shading normal that faces
     the ray; `entering`: the ray comes from the side that `outward` points to; `lit_side`: geometric normal facing the
-    ray; `shape`, `primitive`, `texture`, `plane_bit`: ids.
+    ray; `shape`, `primitive`: numbers; `ids`: the shape's row of `DeviceScene.ids`.
     """
 
     p: Any
@@ -39,8 +39,7 @@ class Surface:
     entering: Any
     shape: Any
     primitive: Any
-    texture: Any
-    plane_bit: Any
+    ids: Any
 
 
 def free_ray(scene: DeviceScene, o: Any, d: Any) -> Ray:
@@ -143,7 +142,7 @@ def _holds_light(segment: Segment, test: TriangleTest) -> Any:
 
 
 def _refraction_of(scene: DeviceScene, primitive: Any) -> Any:
-    return dr.gather(scene.backend.Float, scene.materials, shape_of(scene, primitive, True) * 8 + 2)
+    return dr.gather(scene.backend.Float, scene.surfaces, shape_of(scene, primitive, True) * 8 + 2)
 
 
 def _power_0_1_2(factor: Any, count: Any) -> Any:
@@ -164,13 +163,13 @@ def surface_at(scene: DeviceScene, ray: Ray, hit: Hit, active: Any) -> Surface:
     shape = shape_of(scene, hit.primitive, active)
     ids = dr.gather(backend.IdVector4, scene.ids, shape, active)
     p = dr.fma(hit.t, ray.d, ray.o)
-    p, outward = _geometry_at(scene, ids.x, shape, hit.primitive, p, active)
+    p, outward = _geometry_at(scene, ids.x // KIND_UNIT, shape, hit.primitive, p, active)
     entering = dr.dot(outward, ray.d) < 0
     lit_side = dr.select(entering, outward, -outward)
     normal = lit_side
     if scene.smooth is not None:
         normal = _smooth_normal(scene, shape, hit.primitive, p, ray.d, lit_side, entering, active)
-    return Surface(p, outward, normal, lit_side, entering, shape, hit.primitive, ids.y, ids.z)
+    return Surface(p, outward, normal, lit_side, entering, shape, hit.primitive, ids)
 
 
 def _geometry_at(
@@ -238,7 +237,7 @@ def departure(scene: DeviceScene, ray: Ray) -> Departure:
     active = ray.departing
     primitive = ray.departure >> 1
     shape = shape_of(scene, primitive, active)
-    kind = dr.gather(backend.IdVector4, scene.ids, shape, active).x
+    kind = dr.gather(backend.IdVector4, scene.ids, shape, active).x // KIND_UNIT
     row = dr.gather(backend.Vector4, scene.geometry, shape, active)
     center = backend.Vector3(row.x, row.y, row.z)
     is_mesh = active & (kind == MESH)
@@ -264,5 +263,5 @@ def departure(scene: DeviceScene, ray: Ray) -> Departure:
 def leave(ray: Ray, surface: Surface, d: Any, crosses: bool) -> Ray:
     """The ray that leaves a surface in direction d: on the side it came from, or through it."""
     inside = surface.entering if crosses else ~surface.entering
-    sides = ray.sides ^ surface.plane_bit if crosses else ray.sides
+    sides = ray.sides ^ surface.ids.w if crosses else ray.sides
     return Ray(surface.p, d, departure_word(surface.primitive, inside), sides)

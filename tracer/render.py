@@ -7,19 +7,20 @@ import json
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 import drjit as dr
 import numpy as np
 
-from tracer.aovs import LAYERS, compute_layers, empty_layer
+from tracer.aovs import LAYERS, compute_layers
 from tracer.backends import Backend, exact_arithmetic, find_backend, thread_count
 from tracer.canvas import Canvas, DeviceCanvas
 from tracer.color import encode_srgb
 from tracer.device_scene import DeviceScene, compile_scene
 from tracer.errors import UsageError
 from tracer.film.depth_of_field import blur_reach, depth_of_field
+from tracer.film.film import Film
 from tracer.film.result import Result
 from tracer.scene import Scene
 from tracer.tiles import Band, Rectangle, bands, lane_pixels
@@ -41,32 +42,6 @@ class RenderInterrupted(KeyboardInterrupt):
     def __init__(self, partial: Result) -> None:
         super().__init__("interrupted")
         self.partial = partial
-
-
-@dataclass
-class Film:
-    """The picture under way, in host memory, for one rectangle of the full picture."""
-
-    rectangle: Rectangle
-    color: np.ndarray
-    depth: np.ndarray
-    alpha: np.ndarray
-    layers: dict[str, np.ndarray] = field(default_factory=dict)
-    counts: dict[str, int] = field(default_factory=dict)
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @staticmethod
-    def blank(rectangle: Rectangle, dtype: Any, layers: Sequence[str]) -> Film:
-        """A film on which nothing was found yet."""
-        x0, y0, x1, y1 = rectangle
-        height, width = y1 - y0, x1 - x0
-        return Film(
-            rectangle=rectangle,
-            color=np.zeros((height, width, 3), dtype),
-            depth=np.full((height, width), -1, dtype),
-            alpha=np.zeros((height, width), np.float32),
-            layers={name: empty_layer(name, height, width, dtype) for name in layers},
-        )
 
 
 @dataclass(frozen=True)
@@ -143,11 +118,10 @@ class _Job:
 
     def _trace(self, rectangle: Rectangle) -> Film:
         """The first pass over a rectangle, band by band."""
-        film = Film.blank(rectangle, self.backend.dtype, self.layers)
+        film = Film(rectangle, self.backend.dtype, dict.fromkeys(("primary", *COUNTERS), 0))
         started = time.perf_counter()
         x0, y0, x1, y1 = rectangle
         pixels = (x1 - x0) * (y1 - y0)
-        film.counts = {"primary": 0} | dict.fromkeys(COUNTERS, 0)
         try:
             for band in bands(rectangle, self.n**2, self.settings.rays_per_band):
                 self._trace_band(film, band)
@@ -171,28 +145,16 @@ class _Job:
             active=active,
         )
         found = trace_pixels(self.device, self.device_canvas, pixels)
-        index = row * backend.opaque_id(band.width) + column
-        size = band.width * band.height
-        rgba = dr.zeros(backend.Float, 4 * size)
-        depth = dr.zeros(backend.Float, size)
-        value = backend.Vector4(found.color.x, found.color.y, found.color.z, found.coverage)
-        dr.scatter(rgba, value, index, active, mode=dr.ReduceMode.Permute)
-        dr.scatter(depth, found.depth, index, active, mode=dr.ReduceMode.Permute)
-        layers = {}
+        layers = {"color": found.color, "alpha": found.coverage, "depth": found.depth, "z": found.view_depth}
         if self.layers:
-            dr.eval(rgba, depth, found)
-            layers = compute_layers(self.device, self.device_canvas, pixels, found, self.layers)
-            layers = {name: _scattered(backend, value, index, active, size) for name, value in layers.items()}
+            dr.eval(found)
+            layers |= compute_layers(self.device, self.device_canvas, pixels, found, self.layers)
+        index = row * backend.opaque_id(band.width) + column
+        picture = {name: _scattered(values, index, active, band) for name, values in layers.items()}
         totals = _totals(backend, found.counts)
-        dr.eval(rgba, depth, totals, layers)
-        rows = slice(band.y0 - film.rectangle[1], band.y1 - film.rectangle[1])
-        picture = rgba.numpy().reshape(band.height, band.width, 4)
-        film.color[rows], film.alpha[rows] = picture[..., :3], picture[..., 3]
-        film.depth[rows] = depth.numpy().reshape(band.height, band.width)
-        for name, values in layers.items():
-            target = film.layers[name]
-            target[rows] = values.numpy().reshape(target[rows].shape)
-        film.counts["primary"] += size * self.n**2
+        dr.eval(picture, totals)
+        film.take(band, {name: values.numpy() for name, values in picture.items()})
+        film.counts["primary"] += band.width * band.height * self.n**2
         for name, total in totals.items():
             merge = max if name == "deepest_level" else int.__add__
             film.counts[name] = merge(film.counts[name], int(total.numpy()[0]))
@@ -223,8 +185,8 @@ class _Job:
             color=film.color,
             depth=film.depth,
             alpha=film.alpha,
-            z=_view_depth(film.depth, film.rectangle, canvas),
-            aovs=layers | film.layers,
+            z=film.z + self.backend.dtype(canvas.distance),
+            aovs=layers | {name: film.arrays[name] for name in self.layers if name in film.arrays},
             stats=self._stats(film),
             scene_name=scene.name,
             scene_hash=scene_hash(scene),
@@ -311,10 +273,13 @@ def scene_hash(scene: Scene) -> str:
     return hashlib.sha256(json.dumps(scene.to_dict(), sort_keys=True).encode()).hexdigest()
 
 
-def _scattered(backend: Backend, value: Any, index: Any, active: Any, size: int) -> Any:
-    """Values of lanes (components, n) in the order of the picture, components last."""
+def _scattered(value: Any, index: Any, active: Any, band: Band) -> Any:
+    """Values of lanes (components, n) in the order of the picture, components last.
+
+    Each pixel is written by the one lane that owns it: no atomics.
+    """
     components = [value] if dr.depth_v(value) == 1 else list(value)
-    target = dr.empty(type(components[0]), size * len(components))
+    target = dr.empty(type(components[0]), band.width * band.height * len(components))
     for k, component in enumerate(components):
         dr.scatter(target, component, index * len(components) + k, active, mode=dr.ReduceMode.Permute)
     return target
@@ -334,14 +299,3 @@ def _totals(backend: Backend, counts: Counts) -> dict[str, Any]:
 
 def _ray_count(counts: dict[str, int]) -> int:
     return sum(counts[kind] for kind in ("primary", "shadow", "reflected", "refracted", "total_reflection"))
-
-
-def _view_depth(depth: np.ndarray, rectangle: Rectangle, canvas: Canvas) -> np.ndarray:
-    """Distance from the eye along the view axis, dis + t (d.f), +inf where nothing was hit.
-
-    For a supersampled pixel the angle is that of the pixel's center.
-    """
-    x0, y0, x1, y1 = rectangle
-    column, row = np.arange(x0, x1) + 0.5, np.arange(y0, y1)[:, None] + 0.5
-    cosine = (canvas.distance / canvas.eye_to_canvas(column, row)).astype(depth.dtype)
-    return np.where(depth >= 0, canvas.distance + depth * cosine, np.inf).astype(depth.dtype)

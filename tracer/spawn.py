@@ -12,17 +12,20 @@ from tracer.direct_light import Finish
 from tracer.intersection import Surface, leave
 from tracer.path import make_path
 from tracer.ray import Ray
+from tracer.textures.tables import TextureRow
 
 
 @dataclass
 class MaterialRow:
-    """The material at n hits: `ior`, shares `reflection` k_r, `refraction` k_t, `absorption` k_a, and its finish."""
+    """The material at n hits: `ior`, shares `reflection` k_r, `refraction` k_t, `absorption` k_a, its finish, and the
+    texture."""
 
     ior: Any
     reflection: Any
     refraction: Any
     absorption: Any
     finish: Finish
+    texture: TextureRow
 
 
 @dataclass
@@ -45,13 +48,20 @@ class Children:
 def material_at(scene: DeviceScene, surface: Surface, active: Any) -> MaterialRow:
     """The material of the surfaces."""
     backend = scene.backend
-    a, b = (dr.gather(backend.Vector4, scene.materials, surface.shape * 2 + k, active) for k in range(2))
-    return MaterialRow(a.x, a.y, a.z, b.z, Finish(a.w, b.x, b.y))
+    a, b = (dr.gather(backend.Vector4, scene.surfaces, surface.shape * 2 + k, active) for k in range(2))
+    ids = surface.ids
+    texture = TextureRow(ids.x, ids.y, ids.z, b.w, surface.shape)
+    return MaterialRow(a.x, a.y, a.z, a.w, Finish(b.x, b.y, b.z), texture)
 
 
 def mirror_direction(d: Any, n: Any) -> Any:
     """r = d + 2 c n with c = -n.d."""
-    return dr.fma(-2 * dr.dot(n, d), n, d)
+    return _unit_again(dr.fma(-2 * dr.dot(n, d), n, d))
+
+
+def _unit_again(d: Any) -> Any:
+    """Takes the rounding out of the length of a nearly unit vector, by one Newton step for 1/sqrt at 1."""
+    return d * dr.fma(-0.5, dr.squared_norm(d), 1.5)
 
 
 def refract_direction(d: Any, n: Any, ior: Any, entering: Any) -> tuple[Any, Any]:
@@ -62,7 +72,7 @@ def refract_direction(d: Any, n: Any, ior: Any, entering: Any) -> tuple[Any, Any
     eta = dr.select(entering, dr.rcp(ior), ior)
     c = -dr.dot(n, d)
     k = dr.fma(-eta * eta, dr.fma(-c, c, 1), 1)
-    bent = dr.fma(eta, d, (eta * c - dr.sqrt(k)) * n)
+    bent = _unit_again(dr.fma(eta, d, (eta * c - dr.sqrt(k)) * n))
     return dr.select(ior == 1, d, bent), (k < 0) & (ior != 1)
 
 

@@ -19,7 +19,7 @@ from tracer.direct_light import direct_light
 from tracer.intersection import Surface, closest_hit, free_ray, surface_at
 from tracer.path import make_path, path_type
 from tracer.spawn import material_at, spawn
-from tracer.textures.tables import texture_color, texture_row
+from tracer.textures.tables import texture_color
 
 
 @dataclass
@@ -37,11 +37,13 @@ class PixelGrid:
 @dataclass
 class PixelColumns:
     """What the loop finds for n pixels: mean `color` (3, n), `coverage` (share of sub-rays that hit), and of the
-    nearest sub-ray `depth` (-1: none), `primitive` and `sub_ray`; `counts`: rays by kind."""
+    nearest sub-ray `depth` (-1: none), `view_depth` (how far the hit is from the canvas along the view axis, infinite:
+    none), `primitive` and `sub_ray`; `counts`: rays by kind."""
 
     color: Any
     coverage: Any
     depth: Any
+    view_depth: Any
     primitive: Any
     sub_ray: Any
     counts: Counts
@@ -80,6 +82,7 @@ def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid) ->
     color = dr.zeros(backend.Vector3, width)  # sum over the sub-rays
     hits = dr.zeros(backend.UInt32, width)  # sub-rays that hit something
     depth = dr.full(backend.Float, float("inf"), width)  # of the nearest sub-ray
+    view_depth = dr.full(backend.Float, float("inf"), width)  # the same along the view axis
     nearest = dr.full(backend.UInt32, INVALID, width)  # its primitive
     nearest_sub_ray = dr.zeros(backend.UInt32, width)  # its number
     counts = Counts.zero(backend, width)
@@ -99,13 +102,14 @@ def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid) ->
         closer = is_primary & found & (hit.t < depth)
         hits += dr.select(is_primary & found, backend.UInt32(1), 0)
         depth = dr.select(closer, hit.t, depth)
+        view_depth = dr.select(closer, hit.t * dr.dot(path.d, canvas.axis), view_depth)
         nearest = dr.select(closer, hit.primitive, nearest)
         nearest_sub_ray = dr.select(closer, sub_ray, nearest_sub_ray)
 
         # ---- Its own light, or the background ----
-        row = texture_row(backend, scene.textures, surface.texture, found)
-        own = texture_color(backend, scene.textures, row, texture_point(scene, surface, found), found)
         material = material_at(scene, surface, found)
+        point = texture_point(scene, surface, found)
+        own = texture_color(backend, scene.textures, material.texture, point, found)
         light, shadow_rays = direct_light(
             scene, path.ray, surface, material.finish, pixels.number, sub_ray, found
         )
@@ -146,6 +150,7 @@ def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid) ->
         color=color * share,
         coverage=backend.Float(hits) * share,
         depth=dr.select(hits > 0, depth, -1),
+        view_depth=view_depth,
         primitive=nearest,
         sub_ray=nearest_sub_ray,
         counts=counts,

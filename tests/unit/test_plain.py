@@ -43,6 +43,7 @@ from reference.plain import (
 )
 from reference.plain_files import BUILTIN_MESHES, read_mesh, read_picture
 
+ON_AXIS = Vec(0, 0, 9)
 TOLERANCE = 1e-14  # some tens of roundings of numbers near 1
 
 
@@ -250,6 +251,30 @@ def test_rays_do_not_hit_the_other_half_of_their_quad() -> None:
     assert (picture.color[picture.depth > 0] > 0).all()
 
 
+def test_convex_edge_is_lit() -> None:
+    """A pixel aimed exactly at the edge x = 1 of a cube sees its front lit from over the edge.
+
+    n.l = 4 / sqrt(32): the light stands 4 before the front and 4 beyond the edge.
+    """
+    cube = {"kind": "mesh", "builtin": "cube", "translate": [0, 0, -5]}
+    lights = [{"position": [5, 0, 0]}]
+    world = scene(cube, camera={"position": [1, 0, 0]}, lights=lights, ambient=0)
+    assert close(shade_pixel(world, 0, 0)[0].x, math.sqrt(0.5))
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_surfaces_in_one_plane_do_not_shadow_each_other(order: int) -> None:
+    """A parallelogram in the endless plane x + y + z = 1: all of it is lit, whichever of the two is hit."""
+    vertices = [[1, 0, 0], [0, 1, 0], [-1, 1, 1], [0, 0, 1]]
+    parallelogram = {"kind": "mesh", "vertices": vertices, "faces": [[0, 1, 2, 3]]}
+    endless = {"kind": "plane", "coefficients": [1, 1, 1, -1]}
+    camera = {"resolution": [20, 20], "position": [0, 0, 5], "pixel_size": 0.1, "distance": 7.0}
+    world = scene(
+        *(parallelogram, endless)[::order], camera=camera, lights=[{"position": [3, 4, 5]}], ambient=0
+    )
+    assert (render(world).color > 0).all()
+
+
 def test_room_corner_is_lit() -> None:
     """Floor y = -1 and wall x = 1 meet where |dx| = |dy|; each pixel there is lit by the light in the room.
 
@@ -451,37 +476,42 @@ def test_diffuse_term_reflection() -> None:
         assert shade_pixel(world, 0, 0)[0].x == pytest.approx(expected, abs=1e-14)
 
 
-def shadowed(*blockers: dict[str, Any], **settings: Any) -> float:
-    """D at (0,0,-9) on a wall, under a light on the axis behind the canvas, with blockers beside the eye's
-    ray.
+def shadowed(*blockers: dict[str, Any], light: Vec = ON_AXIS, **settings: Any) -> float:
+    """What arrives at (0, 0, -9) on a wall from a light behind the canvas: 1, or what is left of it.
+
+    Phong's term with power 0 is 1 wherever the light is in front; what is behind the canvas is not seen.
     """
-    floor = {"kind": "plane", "coefficients": [0, 1, 0, 1]}
-    camera = {"position": [0, 0, 0], "rotate": [0, -90]}
-    world = scene(floor, *blockers, camera=camera, lights=[{"position": [0, 9, 0]}], ambient=0, **settings)
+    materials = {"white": {"diffuse": 0, "specular": 1, "shininess": 0}, "glass": {"refraction": 0.6}}
+    lights = [{"position": light}]
+    target = wall(-9.0, material="white")
+    world = scene(target, *blockers, lights=lights, materials=materials, ambient=0, **settings)
     return shade_pixel(world, 0, 0)[0].x
 
 
 def test_shadows() -> None:
-    """The floor below the light: 1 when free, 0 under a ball, k_t^2 = 0.36 with transparent shadows.
+    """1 when free, 0 behind a ball; with transparent shadows k_t^2 = 0.36, and k_t^4 behind two.
 
-    A cube's diagonal, hit exactly, is one surface: k_t^2 too. Two balls: k_t^4.
+    The ray goes exactly through diagonals of the cube's two faces, each of which is one surface: k_t^2.
     """
-    glass = {"materials": {"glass": {"refraction": 0.6}}}
-    high = {"kind": "sphere", "center": [0, 5, 0], "radius": 1, "material": "glass"}
-    cube = {"kind": "mesh", "builtin": "cube", "translate": [0, 5, 0], "material": "glass"}
+    near, far = ball(5.0, 1.0, material="glass"), ball(2.5, 1.0, material="glass")
+    cube = {"kind": "mesh", "builtin": "cube", "translate": [0, 0, 5], "material": "glass"}
     assert shadowed() == 1
-    assert shadowed(high, **glass) == 0
-    assert close(shadowed(high, transparent_shadows=True, **glass), 0.36)
-    assert close(shadowed(cube, transparent_shadows=True, **glass), 0.36)
-    assert close(shadowed(high, {**high, "center": [0, 2.5, 0]}, transparent_shadows=True, **glass), 0.1296)
+    assert shadowed(near) == 0
+    assert close(shadowed(near, transparent_shadows=True), 0.36)
+    assert close(shadowed(cube, transparent_shadows=True), 0.36)
+    assert close(shadowed(near, far, transparent_shadows=True), 0.1296)
 
 
 def test_light_on_a_surface_is_free() -> None:
-    """A light in the ceiling's plane, or on a lamp's skin, is not shadowed by it; behind the skin it is."""
-    assert shadowed({"kind": "plane", "coefficients": [0, 0.3, 0, -2.7]}) == 1
-    assert shadowed({"kind": "plane", "coefficients": [0.1, 0.3, 0, -2.7]}) == 1
-    assert shadowed({"kind": "sphere", "center": [0, 9.7, 0], "radius": 0.7}) == 1
-    assert shadowed({"kind": "sphere", "center": [0, 9, 0], "radius": 0.7}) == 0
+    """A light in a plane or on a lamp's skin is not shadowed by it, however the distances round."""
+    random.seed(5)
+    for _ in range(100):
+        light = Vec(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(5, 9))
+        n = Vec(random.uniform(-1, 1), random.uniform(-1, 1), 1.0)
+        assert shadowed({"kind": "plane", "coefficients": [*n, -dot(n, light)]}, light=light) == 1
+        lamp = {"kind": "sphere", "center": light + 0.5 / norm(n) * n, "radius": 0.5}
+        assert shadowed(lamp, light=light) == 1
+        assert shadowed({**lamp, "center": light}, light=light) == 0
 
 
 @pytest.mark.parametrize(
@@ -526,6 +556,26 @@ def test_area_light_positions() -> None:
     )
     found = light_samples(scene(lights=[rectangle]), 0, 0)[0].position
     assert close(found, (-1, (0.5 * (math.sqrt(5) - 1) / 2 - 0.5) * 2, 0))
+
+
+def bent_triangle(tmp_path: Path, normal: str, **settings: Any) -> World:
+    """A triangle across the view, facing the eye, with one normal of the file at all corners."""
+    (tmp_path / "bent.obj").write_text(f"v -9 -9 -2\nv 9 -9 -2\nv 0 9 -2\nvn {normal}\nf 1//1 2//1 3//1\n")
+    shape = {"kind": "mesh", "file": "bent.obj", "smooth": True}
+    return load({"camera": {"resolution": [1, 1]}, "shapes": [shape], "ambient": 0, **settings}, tmp_path)
+
+
+def test_smooth_normals(tmp_path: Path) -> None:
+    """n = (0.6, 0, 0.8): r = (0,0,-1) + 1.6 n = (0.96, 0, 0.28); n = (0.8, 0, -0.6) faces away: (0, 0, 1).
+
+    A light behind the triangle's plane stays dark although n = (0.96, 0, 0.28) points towards it.
+    """
+    path = trace_path(bent_triangle(tmp_path, "0.6 0 0.8"), (0, 0, 0), (0, 0, -1), "R")
+    assert path[0].direction == pytest.approx((0.96, 0, 0.28), abs=1e-14)
+    path = trace_path(bent_triangle(tmp_path, "0.8 0 -0.6"), (0, 0, 0), (0, 0, -1), "R")
+    assert path[0].direction == pytest.approx((0, 0, 1), abs=0)
+    dark = render(bent_triangle(tmp_path, "0.96 0 0.28", lights=[{"position": [20, 0, -3]}]))
+    assert (dark.color == 0).all() and dark.counts["shadow"] == 0
 
 
 def test_smooth_cube_corner() -> None:

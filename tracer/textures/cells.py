@@ -1,7 +1,8 @@
 """From a coordinate to the number of a cell (document, sections 3.3 and 6).
 
 F(q) = floor(q + eps): the small value puts a surface that lies exactly on a border into one cell all over. It must
-outweigh the rounding of the point, so it grows with the point's largest coordinate in single precision.
+outweigh the rounding of the point, so it grows with the point's largest coordinate in single precision. It outweighs
+also that coordinates are multiplied by 1/interval in place of a division.
 """
 
 from __future__ import annotations
@@ -41,6 +42,6 @@ class CellRule:
 
 def modulo(a: Any, n: Any) -> Any:
     """a mod n in 0 .. n-1 for whole numbers in floats: exact below 2^24 (2^53), never out of range beyond."""
-    rest = a - n * dr.floor(a / n)
+    rest = a - n * dr.floor(a * dr.rcp(n))
     rest = dr.select(rest < 0, rest + n, rest)
     return dr.select((rest >= 0) & (rest < n), rest, 0)

@@ -20,8 +20,8 @@ class Checker(CellTexture):
     interval: Positive = Field(description="edge of a cube, in scene units")
 
 
-def checker_number(rule: CellRule, p: Any, interval: Any) -> Any:
-    """Number of the color at point p (3, n): (F(x/I) + F(y/I) + F(z/I)) mod 2."""
-    largest = max_abs(p) / interval
-    cell = sum(rule.cell(coordinate / interval, largest) for coordinate in p)
+def checker_number(rule: CellRule, p: Any, rate: Any) -> Any:
+    """Number of the color at point p (3, n): (F(x/I) + F(y/I) + F(z/I)) mod 2, with rate = 1/I."""
+    largest = max_abs(p) * rate
+    cell = sum(rule.cell(coordinate * rate, largest) for coordinate in p)
     return modulo(rule.magnitude(cell), type(largest)(2))

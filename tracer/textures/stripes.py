@@ -22,7 +22,7 @@ class Stripes(CellTexture):
     interval: Positive = Field(description="width of a stripe along x, y or z, in scene units")
 
 
-def stripe_number(rule: CellRule, p: Any, interval: Any, colors: Any) -> Any:
-    """Number of the color at point p (3, n): F((x + y + z) / interval) mod colors."""
-    cell = rule.cell((p.x + p.y + p.z) / interval, max_abs(p) / interval)
+def stripe_number(rule: CellRule, p: Any, rate: Any, colors: Any) -> Any:
+    """Number of the color at point p (3, n): F((x + y + z) rate) mod colors, with rate = 1/interval."""
+    cell = rule.cell((p.x + p.y + p.z) * rate, max_abs(p) * rate)
     return modulo(rule.magnitude(cell), colors)

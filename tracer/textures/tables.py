@@ -26,32 +26,41 @@ STRIPES, CHECKER, PICTURE = range(3)
 TRUNCATE, FLIP_V, BILINEAR = 4, 8, 16
 KIND_MASK = 3
 
-NUMBERS = 8
-"""Floats of a texture: the interval, or the 2x4 matrix of a picture."""
+
+@dataclass(frozen=True)
+class PackedTexture:
+    """One texture on the host: `flags` (kind and options), `first` palette entry, `count` of colors (a picture: its
+    columns), `lines` of a picture, cells per scene unit `rate`, 2x4 `matrix` of a picture."""
+
+    flags: int
+    first: int
+    count: int
+    lines: int = 1
+    rate: float = 1.0
+    matrix: np.ndarray | None = None
 
 
 @dataclass
 class TextureTables:
-    """`numbers`: 8 floats a texture; `ids`: 4 a texture (kind and flags, first palette entry, colors or width, height);
-    `palette`: 4 floats a color. `flags`: all bits that occur, `kinds`: all kinds that occur (part of the structure)."""
+    """`palette`: 4 floats a color. By shape, when there are pictures: `matrices` (8 floats), `lines`.
+    `flags`: all option bits that occur, `kinds`: all kinds that occur; both are part of the structure."""
 
-    numbers: Any
-    ids: Any
     palette: Any
+    matrices: Any
+    lines: Any
     flags: int
     kinds: frozenset[int]
 
 
 @dataclass
 class TextureRow:
-    """The texture of each of n points: `flags`, `first`, `width`, `height` (n,), matrix rows `u`, `v` (4, n)."""
+    """The texture of each of n points (n,): see `PackedTexture`; `shape` says where to find the rest of a picture."""
 
     flags: Any
     first: Any
-    width: Any
-    height: Any
-    u: Any
-    v: Any
+    count: Any
+    rate: Any
+    shape: Any
 
     @property
     def kind(self) -> Any:
@@ -62,55 +71,51 @@ class TextureRow:
         """Mask: the texture has that flag."""
         return (self.flags & flag) != 0
 
-    def coordinates(self, p: Any) -> tuple[Any, Any]:
-        """(u, v) of points p (3, n) on the picture, in texels."""
-        u = dr.fma(self.u.x, p.x, dr.fma(self.u.y, p.y, dr.fma(self.u.z, p.z, self.u.w)))
-        v = dr.fma(self.v.x, p.x, dr.fma(self.v.y, p.y, dr.fma(self.v.z, p.z, self.v.w)))
-        return u, v
-
 
 class TexturePacker:
-    """Collects textures into tables. `decode` takes colors (n, 3) to the color space of the shading."""
+    """Collects textures and their palette. `decode` takes colors (n, 3) to the color space of the shading, `read`
+    turns a picture's file name into texels (h, w, 3)."""
 
-    def __init__(self, literal: bool, decode: Callable[[np.ndarray], np.ndarray]) -> None:
-        self._literal, self._decode = literal, decode
-        self._numbers: list[np.ndarray] = []
-        self._ids: list[tuple[int, int, int, int]] = []
+    def __init__(
+        self,
+        literal: bool,
+        decode: Callable[[np.ndarray], np.ndarray],
+        read: Callable[[str], np.ndarray],
+    ) -> None:
+        self._literal, self._decode, self._read = literal, decode, read
         self._palette: list[np.ndarray] = []
         self._size = 0
         self._pictures: dict[str, tuple[int, int, int]] = {}
 
-    def add(self, texture: TextureRecord, read: Callable[[str], np.ndarray]) -> int:
-        """Adds one texture and returns its number; `read` turns a picture's file name into texels (h, w, 3)."""
-        numbers = np.zeros(NUMBERS)
+    def pack(self, texture: TextureRecord) -> PackedTexture:
+        """Adds the colors of one texture and says where they are."""
         if isinstance(texture, (Image, AffineImage)):
-            numbers[:] = texture.texel_matrix().ravel()
-            first, width, height = self._add_picture(texture.file, read)
-            ids = (PICTURE | self._flags(texture), first, width, height)
-        elif isinstance(texture, (Stripes, Checker)):
+            first, width, height = self._add_picture(texture.file)
+            flags = PICTURE | self._flags(texture)
+            return PackedTexture(flags, first, width, height, matrix=texture.texel_matrix())
+        if isinstance(texture, (Stripes, Checker)):
             kind = STRIPES if isinstance(texture, Stripes) else CHECKER
-            numbers[0] = texture.interval
             colors = np.array(texture.colors)
-            ids = (kind | self._flags(texture), self._add_colors(colors), len(colors), 1)
-        else:
-            assert isinstance(texture, Solid)
-            numbers[0] = 1
-            ids = (STRIPES, self._add_colors(np.array([texture.color])), 1, 1)
-        self._numbers.append(numbers)
-        self._ids.append(ids)
-        return len(self._ids) - 1
+            rate = 1 / texture.interval
+            return PackedTexture(kind | self._flags(texture), self._add(colors), len(colors), rate=rate)
+        assert isinstance(texture, Solid)
+        return PackedTexture(STRIPES, self._add(np.array([texture.color])), 1)
 
-    def tables(self, backend: Backend) -> TextureTables:
-        """Uploads what was added."""
-        palette = np.zeros((self._size, 4))
-        palette[:, :3] = np.concatenate(self._palette)
-        flags = [row[0] for row in self._ids]
+    def tables(self, backend: Backend, by_shape: Sequence[PackedTexture]) -> TextureTables:
+        """Uploads the palette, and the numbers of pictures by shape."""
+        palette = np.zeros((max(1, self._size), 4))
+        if self._palette:
+            palette[: self._size, :3] = np.concatenate(self._palette)
+        matrices = np.zeros((len(by_shape), 2, 4))
+        for shape, texture in enumerate(by_shape):
+            if texture.matrix is not None:
+                matrices[shape] = texture.matrix
         return TextureTables(
-            numbers=backend.table(np.array(self._numbers)),
-            ids=backend.id_table(np.array(self._ids)),
             palette=backend.table(palette),
-            flags=int(np.bitwise_or.reduce(flags)),
-            kinds=frozenset(flag & KIND_MASK for flag in flags),
+            matrices=backend.table(matrices) if self._pictures else None,
+            lines=backend.id_table([texture.lines for texture in by_shape]) if self._pictures else None,
+            flags=int(np.bitwise_or.reduce([texture.flags & ~KIND_MASK for texture in by_shape] or [0])),
+            kinds=frozenset(texture.flags & KIND_MASK for texture in by_shape),
         )
 
     def _flags(self, texture: CellTexture) -> int:
@@ -121,39 +126,26 @@ class TexturePacker:
             flags |= (FLIP_V if flip else 0) | (BILINEAR if texture.filter == "bilinear" else 0)
         return flags
 
-    def _add_colors(self, colors: np.ndarray) -> int:
+    def _add(self, colors: np.ndarray) -> int:
         first = self._size
         self._palette.append(self._decode(colors))
         self._size += len(colors)
         return first
 
-    def _add_picture(self, file: str, read: Callable[[str], np.ndarray]) -> tuple[int, int, int]:
+    def _add_picture(self, file: str) -> tuple[int, int, int]:
         if file not in self._pictures:
-            texels = read(file)
+            texels = self._read(file)
             height, width = texels.shape[:2]
-            self._pictures[file] = (self._add_colors(texels.reshape(-1, 3)), width, height)
+            self._pictures[file] = (self._add(texels.reshape(-1, 3)), width, height)
         return self._pictures[file]
 
 
-def pack_textures(
-    backend: Backend,
-    textures: Sequence[TextureRecord],
-    literal: bool,
-    decode: Callable[[np.ndarray], np.ndarray],
-    read: Callable[[str], np.ndarray],
-) -> TextureTables:
-    """Tables of textures, in their order."""
-    packer = TexturePacker(literal, decode)
-    for texture in textures:
-        packer.add(texture, read)
-    return packer.tables(backend)
-
-
-def texture_row(backend: Backend, tables: TextureTables, texture: Any, active: Any) -> TextureRow:
-    """Reads the rows of textures (n,)."""
-    ids = dr.gather(backend.IdVector4, tables.ids, texture, active)
-    u, v = (dr.gather(backend.Vector4, tables.numbers, texture * 2 + k, active) for k in range(2))
-    return TextureRow(ids.x, ids.y, ids.z, ids.w, u, v)
+def picture_coordinates(backend: Backend, tables: TextureTables, row: TextureRow, p: Any, active: Any) -> Any:
+    """(u, v) of points p (3, n) on their pictures, in texels, (2, n)."""
+    m, n = (dr.gather(backend.Vector4, tables.matrices, row.shape * 2 + k, active) for k in range(2))
+    u = dr.fma(m.x, p.x, dr.fma(m.y, p.y, dr.fma(m.z, p.z, m.w)))
+    v = dr.fma(n.x, p.x, dr.fma(n.y, p.y, dr.fma(n.z, p.z, n.w)))
+    return backend.Vector2(u, v)
 
 
 def texture_color(backend: Backend, tables: TextureTables, row: TextureRow, p: Any, active: Any) -> Any:
@@ -162,21 +154,23 @@ def texture_color(backend: Backend, tables: TextureTables, row: TextureRow, p: A
     rule = CellRule(backend, truncate)
     number = backend.UInt32(0)
     if STRIPES in tables.kinds:
-        cell = stripe_number(rule, p, row.u.x, backend.Float(row.width))
+        cell = stripe_number(rule, p, row.rate, backend.Float(row.count))
         number = dr.select(row.kind == STRIPES, backend.UInt32(cell), number)
     if CHECKER in tables.kinds:
-        cell = checker_number(rule, p, row.u.x)
+        cell = checker_number(rule, p, row.rate)
         number = dr.select(row.kind == CHECKER, backend.UInt32(cell), number)
     if PICTURE not in tables.kinds:
         return _entry(backend, tables, row.first + number, active)
-    u, v = row.coordinates(p)
-    largest = dr.maximum(dr.abs(u), dr.abs(v))
     is_picture = active & (row.kind == PICTURE)
-    texel = _texel(backend, row, rule.magnitude(rule.cell(u, largest)), rule.magnitude(rule.cell(v, largest)))
+    u, v = picture_coordinates(backend, tables, row, p, is_picture)
+    lines = dr.gather(backend.UInt32, tables.lines, row.shape, is_picture)
+    largest = dr.maximum(dr.abs(u), dr.abs(v))
+    column, line = (rule.magnitude(rule.cell(c, largest)) for c in (u, v))
+    texel = _texel(backend, row, lines, column, line)
     color = _entry(backend, tables, row.first + dr.select(is_picture, texel, number), active)
     if tables.flags & BILINEAR:
         smooth = is_picture & row.has(BILINEAR)
-        color = dr.select(smooth, _bilinear(backend, tables, row, u, v, smooth), color)
+        color = dr.select(smooth, _bilinear(backend, tables, row, lines, u, v, smooth), color)
     return color
 
 
@@ -185,23 +179,23 @@ def _entry(backend: Backend, tables: TextureTables, index: Any, active: Any) -> 
     return backend.Vector3(color.x, color.y, color.z)
 
 
-def _texel(backend: Backend, row: TextureRow, column: Any, line: Any) -> Any:
+def _texel(backend: Backend, row: TextureRow, lines: Any, column: Any, line: Any) -> Any:
     """Number of a texel within its picture; both indices are tiled by a positive modulo."""
-    i = backend.UInt32(modulo(column, backend.Float(row.width)))
-    j = backend.UInt32(modulo(line, backend.Float(row.height)))
-    upright = row.height - 1 - j
-    return dr.select(row.has(FLIP_V), j, upright) * row.width + i
+    i = backend.UInt32(modulo(column, backend.Float(row.count)))
+    j = backend.UInt32(modulo(line, backend.Float(lines)))
+    return dr.select(row.has(FLIP_V), j, lines - 1 - j) * row.count + i
 
 
-def _bilinear(backend: Backend, tables: TextureTables, row: TextureRow, u: Any, v: Any, active: Any) -> Any:
+def _bilinear(
+    backend: Backend, tables: TextureTables, row: TextureRow, lines: Any, u: Any, v: Any, active: Any
+) -> Any:
     """Mean of the four texels around (u, v), whose centers stand at k + 1/2."""
     i, j = dr.floor(u - 0.5), dr.floor(v - 0.5)
     fu, fv = u - 0.5 - i, v - 0.5 - j
 
     def at(di: int, dj: int) -> Any:
-        return _entry(backend, tables, row.first + _texel(backend, row, i + di, j + dj), active)
+        return _entry(backend, tables, row.first + _texel(backend, row, lines, i + di, j + dj), active)
 
     low = dr.fma(fu, at(1, 0), (1 - fu) * at(0, 0))
     high = dr.fma(fu, at(1, 1), (1 - fu) * at(0, 1))
     return dr.fma(fv, high, (1 - fv) * low)
-

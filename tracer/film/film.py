@@ -1,0 +1,72 @@
+"""The picture under way, in host memory."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tracer.tiles import Band, Rectangle
+
+BLANK = {"color": 0, "alpha": 0, "depth": -1, "z": np.inf, "shape": -1, "primitive": -1}
+"""What a layer holds where nothing was traced yet; NaN for the others."""
+
+
+class Film:
+    """The layers of one rectangle of the picture.
+
+    Layers are (h, w) or (h, w, components) by name: `color`, `alpha`, `depth`, `z` (from the canvas along the view
+    axis) and those asked for. `counts`: rays by kind and how paths ended.
+    """
+
+    def __init__(self, rectangle: Rectangle, dtype: Any, counts: dict[str, int]) -> None:
+        self.rectangle, self.counts = rectangle, counts
+        self.arrays: dict[str, np.ndarray] = {}
+        self._dtype = dtype
+
+    def take(self, band: Band, layers: dict[str, np.ndarray]) -> None:
+        """Adds the finished rows of a band; each array holds its pixels in order, components last."""
+        x0, y0, x1, y1 = self.rectangle
+        for name, values in layers.items():
+            rows = values.reshape(band.height, band.width, -1)
+            if rows.shape[2] == 1:
+                rows = rows[..., 0]
+            if band.height == y1 - y0:
+                self.arrays[name] = rows
+                continue
+            if name not in self.arrays:
+                shape = (y1 - y0, x1 - x0, *rows.shape[2:])
+                self.arrays[name] = np.full(shape, BLANK.get(name, np.nan), rows.dtype)
+            self.arrays[name][band.y0 - y0 : band.y1 - y0] = rows
+
+    def layer(self, name: str) -> np.ndarray:
+        """A layer, blank where nothing was traced."""
+        if name not in self.arrays:
+            x0, y0, x1, y1 = self.rectangle
+            shape = (y1 - y0, x1 - x0, 3) if name == "color" else (y1 - y0, x1 - x0)
+            self.arrays[name] = np.full(shape, BLANK[name], self._dtype)
+        return self.arrays[name]
+
+    @property
+    def color(self) -> np.ndarray:
+        """(h, w, 3) in the color space of the shading."""
+        return self.layer("color")
+
+    @color.setter
+    def color(self, values: np.ndarray) -> None:
+        self.arrays["color"] = values
+
+    @property
+    def depth(self) -> np.ndarray:
+        """(h, w), -1 blank."""
+        return self.layer("depth")
+
+    @property
+    def alpha(self) -> np.ndarray:
+        """(h, w), share of sub-rays that hit something."""
+        return self.layer("alpha")
+
+    @property
+    def z(self) -> np.ndarray:
+        """(h, w), from the canvas along the view axis, infinite where blank."""
+        return self.layer("z")
