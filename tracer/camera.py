@@ -24,7 +24,9 @@ Side = Annotated[int, Field(strict=True, ge=1, le=LARGEST_SIDE), PLAIN]
 class DepthOfField(Record):
     """The filter over the finished picture (document, section 8)."""
 
-    focus: Real = Field(description="distance from the eye that is sharp; negative: off; 0 is refused")
+    focus: Real = Field(
+        description="depth (distance from the canvas along the ray) that is sharp; negative: off; 0 is refused"
+    )
     samples: SampleCount = Field(default=30, description="draws per pixel")
     depth_range: Positive | None = Field(
         default=None, description="pixels whose distance differs by less may mix (default 0.1·focus)"

@@ -70,7 +70,7 @@ class Canvas:
             width=width,
             height=height,
             pixel_size=self.pixel_size * self.width / width,
-            scale=self.scale * width / self.width,
+            scale=self.scale * scale,
         )
 
     def resized(self, width: int, height: int) -> Canvas:

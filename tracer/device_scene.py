@@ -111,9 +111,10 @@ def compile_scene(scene: Scene, backend: Backend) -> DeviceScene:
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     if first[-1] >= INVALID >> 1:
         raise SceneError(f"{scene.name}: {first[-1]} primitives; allowed: fewer than 2^31")
-    host = HostScene(first, meshes, _extent(scene, meshes))
+    rows = _geometry_rows(scene)
+    host = HostScene(first, meshes, _extent(scene, rows, meshes))
     decode = decode_srgb if scene.color_space == "linear" else np.asarray
-    slots, sphere_table, planes = _analytic_shapes(scene, backend, first)
+    slots, sphere_table, planes = _analytic_shapes(scene, backend, rows, first)
     packer = TexturePacker(scene.literal, decode, lambda file: read_picture(scene.resolve(file)))
     textures = _textures(scene, packer)
     return DeviceScene(
@@ -131,7 +132,7 @@ def compile_scene(scene: Scene, backend: Backend) -> DeviceScene:
         smooth=_smooth_tables(scene, backend, meshes),
         shape_of=backend.id_table(np.repeat(np.arange(len(counts)), counts)) if meshes else None,
         triangle_of=backend.id_table(_triangle_numbers(counts, meshes)) if meshes else None,
-        geometry=backend.table(_geometry_rows(scene)),
+        geometry=backend.table(rows),
         ids=backend.id_table(_id_rows(scene, textures)),
         first_primitive=backend.id_table(first[:-1] if len(first) > 1 else [0]),
         surfaces=backend.table(_surface_rows(scene, textures)),
@@ -164,27 +165,24 @@ def _kind(shape: ShapeRecord) -> int:
 
 
 def _analytic_shapes(
-    scene: Scene, backend: Backend, first: np.ndarray
+    scene: Scene, backend: Backend, rows: np.ndarray, first: np.ndarray
 ) -> tuple[list[Any], SphereTable | None, np.ndarray]:
     """Planes and spheres for the kernel, and the rows (n, d) of the planes that have bits."""
     spheres = [i for i, shape in enumerate(scene.shapes) if isinstance(shape, Sphere)]
     many = len(spheres) > UNROLLED_SPHERES
+    planes: list[int] = []
     slots: list[Any] = []
-    planes: list[np.ndarray] = []
     for i, shape in enumerate(scene.shapes):
+        if isinstance(shape, Plane) or (isinstance(shape, Sphere) and not many):
+            slots.append(shape.slot(backend, rows[i], int(first[i]), len(planes)))
         if isinstance(shape, Plane):
-            slots.append(shape.slot(backend, int(first[i]), len(planes)))
-            planes.append(shape.placed_coefficients())
-        elif isinstance(shape, Sphere) and not many:
-            slots.append(shape.slot(backend, int(first[i]), len(planes)))
-    table = None
-    if many:
-        rows = [scene.shapes[i].placed_coefficients() for i in spheres]  # type: ignore[attr-defined]
-        table = SphereTable.of(backend, rows, [int(first[i]) for i in spheres])
-    return slots, table, np.array(planes[:SIDE_BITS]).reshape(-1, 4)
+            planes.append(i)
+    table = SphereTable.of(backend, rows[spheres], first[spheres]) if many else None
+    return slots, table, rows[planes[:SIDE_BITS]]
 
 
 def _geometry_rows(scene: Scene) -> np.ndarray:
+    """(shapes, 4): n, d of a plane, center and radius of a sphere, zero for meshes; at least one row."""
     rows = np.zeros((max(1, len(scene.shapes)), 4))
     for i, shape in enumerate(scene.shapes):
         if isinstance(shape, (Plane, Sphere)):
@@ -307,11 +305,8 @@ def _object_space(scene: Scene, backend: Backend) -> Any:
     return backend.table(rows)
 
 
-def _extent(scene: Scene, meshes: dict[int, PlacedMesh]) -> float:
+def _extent(scene: Scene, rows: np.ndarray, meshes: dict[int, PlacedMesh]) -> float:
     """S: the largest |coordinate| of the finite shapes (spheres and meshes), 0 without any."""
     largest = [float(np.abs(mesh.corners).max()) for mesh in meshes.values()]
-    for shape in scene.shapes:
-        if isinstance(shape, Sphere):
-            row = shape.placed_coefficients()
-            largest.append(float(np.abs(row[:3]).max() + row[3]))
-    return max(largest, default=0.0)
+    spheres = rows[[i for i, shape in enumerate(scene.shapes) if isinstance(shape, Sphere)]]
+    return max([*largest, *(np.abs(spheres[:, :3]).max(axis=1) + spheres[:, 3])], default=0.0)

@@ -59,7 +59,7 @@ def plane_sides(scene: DeviceScene, o: Any, d: Any) -> Any:
 
 
 def closest_hit(scene: DeviceScene, ray: Ray, active: Any, t_max: Any = None) -> Hit:
-    """The smallest t > 0 (below `t_max` when given); of equal ones the lower shape, then the lower primitive."""
+    """The smallest t > 0 (at most `t_max` when given); of equal ones the lower shape, then the lower primitive."""
     hit = no_hit(scene.backend, dr.width(ray.d))
     if t_max is not None:
         hit.t = dr.select(active, t_max, hit.t)
@@ -129,7 +129,7 @@ def transmittance(scene: DeviceScene, segment: Segment, active: Any) -> Any:
             state=share,
             limit=lambda share: dr.select(share > 0, segment.length, never),
             visit=lambda share, _t, primitive, test, valid: dr.select(
-                valid & ~_holds_light(segment, test), share * _refraction_of(scene, primitive), share
+                valid & test.owned & ~_holds_light(segment, test), share * _refraction_of(scene, primitive), share
             ),
             active=active,
         )
@@ -248,7 +248,9 @@ def departure(scene: DeviceScene, ray: Ray) -> Departure:
     outward = dr.select(
         is_mesh, triangle.normal, dr.select(kind == SPHERE, normalize(ray.o - center), center)
     )
-    normal = dr.select(ray.inside, -outward, outward)
+    # A smooth mesh may send a ray to the other side of its facet than its word says: there the direction decides.
+    below = dr.select(is_mesh, dr.dot(outward, ray.d) < 0, ray.inside)
+    normal = dr.select(below, -outward, outward)
     climb = dr.dot(normal, ray.d)
     return Departure(
         active=active,

@@ -22,6 +22,8 @@ class Placement:
         translate: tuple[float, float, float],
     ) -> Placement:
         """The placement for factors (one or three), degrees about x, y, z and a shift."""
+        if not any(rotate) and not any(translate) and scale in (1, (1, 1, 1)):
+            return IDENTITY
         factors = np.broadcast_to(np.asarray(scale, np.float64), 3)
         return Placement(rotation_matrix(rotate), factors, np.asarray(translate, np.float64))
 
@@ -48,9 +50,10 @@ class Placement:
     @property
     def is_identity(self) -> bool:
         """True for a shape that was not moved; its coordinates then stay as they are, bit for bit."""
-        return bool(
-            np.array_equal(self.rotation, np.eye(3)) and (self.scale == 1).all() and not self.shift.any()
-        )
+        return self is IDENTITY
+
+
+IDENTITY = Placement(np.eye(3), np.ones(3), np.zeros(3))
 
 
 def rotation_matrix(degrees: tuple[float, float, float]) -> np.ndarray:

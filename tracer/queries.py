@@ -70,7 +70,7 @@ def intersect(
 
     Args:
         origins, directions: (n, 3), or (3,) for one; directions need not be normalized.
-        t_max: (n,) or a number: hits at this distance or beyond do not count.
+        t_max: (n,) or a number: hits beyond this distance do not count.
 
     Raises: `UsageError` for wrong shapes, NaN and zero directions.
     """

@@ -58,8 +58,10 @@ def visit_triangles(
 
     def leaf(node: Any, state: Any) -> Any:
         slot = (node - tables.leaf_count) * LEAF_SLOTS
+        previous = backend.UInt32(INVALID)
         for k in range(LEAF_SLOTS):
             index = dr.gather(backend.UInt32, tables.order, slot + k)
+            fresh, previous = index != previous, index  # a leaf with one triangle holds it twice
             triangle = gather_triangle(backend, tables.triangles, index, True)
             primitive = dr.gather(backend.UInt32, tables.primitive, index)
             test = meet_triangle(backend.epsilon, triangle, ray, axes)
@@ -72,7 +74,7 @@ def visit_triangles(
                 rv_labels=("t", "valid"),
                 label="near the origin",
             )
-            state = visit(state, t, primitive, test, valid & other & (t <= limit(state)))
+            state = visit(state, t, primitive, test, valid & other & fresh & (t <= limit(state)))
         return state
 
     def body(node: Any, state: Any) -> tuple[Any, Any]:

@@ -74,7 +74,8 @@ def difference_of_products(a: Any, b: Any, c: Any, d: Any) -> Any:
 class TriangleTest:
     """What one test finds.
 
-    `t`: distance to the plane, of either sign; `within`: the line passes inside the edges; `touched`: it does, or
+    `t`: distance to the plane, of either sign; `within`: the line passes inside the edges or exactly through one;
+    `owned`: the same, but of two triangles that share the edge only one claims it; `touched`: the line passes inside, or
     misses an edge by no more than rounding; `height`: signed distance of the ray's origin from the plane; `speed`:
     rate at which it grows; `slack`: a bound on the rounding error of `height`, 8 eps S with S the largest coordinate of
     the origin and of the corners seen from it.
@@ -82,6 +83,7 @@ class TriangleTest:
 
     t: Any
     within: Any
+    owned: Any
     touched: Any
     height: Any
     speed: Any
@@ -104,12 +106,20 @@ def meet_triangle(epsilon: float, triangle: Triangle, ray: Ray, axes: Projection
     height = -dr.dot(triangle.normal, a)
     speed = dr.dot(triangle.normal, ray.d)
     tolerance = 2 * slack * size
+    within = ((low >= 0) | (high <= 0)) & (speed != 0)
     return TriangleTest(
         t=-height / speed,
-        within=((low >= 0) | (high <= 0)) & (speed != 0),
+        within=within,
+        owned=within & _owns(e0, bx, by, cx, cy) & _owns(e1, cx, cy, ax, ay) & _owns(e2, ax, ay, bx, by),
         touched=((low >= -tolerance) | (high <= tolerance)) & (speed != 0),
         height=height,
         speed=speed,
         slack=slack,
     )
 
+
+def _owns(edge: Any, from_x: Any, from_y: Any, to_x: Any, to_y: Any) -> Any:
+    """Mask: a line exactly through this projected edge counts for this triangle; the neighbor runs along it the other
+    way, so of the two just one says so (the fill rule of rasterizers)."""
+    upward = (to_y > from_y) | ((to_y == from_y) & (to_x > from_x))
+    return (edge != 0) | upward

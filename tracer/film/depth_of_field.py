@@ -100,44 +100,42 @@ def _filter(
     key = (backend.opaque_id(settings.seed & 0xFFFFFFFF), backend.UInt32(DEPTH_OF_FIELD_STREAM))
     samples = backend.opaque_id(settings.samples)
 
-    # ---- Draws: guess inside the window; after 64 misses count the admissible pixels and take one of them ----
+    # ---- Draws ----
+    # Every turn looks at one pixel of the window. A draw guesses; after 64 misses the window is walked row by row, once
+    # to count the admissible pixels and then up to the one that the draw names. Sums are of differences to the own
+    # color: where all colors are the same the result is exactly that color.
     total = dr.zeros(backend.Vector3, width)
     drawn = dr.zeros(backend.UInt32, width)
     attempt = dr.zeros(backend.UInt32, width)
-    admissible = dr.zeros(backend.UInt32, width)
+    admissible = dr.zeros(backend.UInt32, width)  # 0: not counted yet
+    passed = dr.zeros(backend.UInt32, width)  # admissible pixels that the walk has left behind
+    walk_column, walk_row = low_column + 0, low_row + 0
+    one, none = backend.UInt32(1), backend.UInt32(0)
     active = sharp & (reach > 0)
     while dr.hint(active, label="depth of field", exclude=[backend, first, canvas, settings]):
         words = philox(key, (pixel, drawn, attempt, backend.UInt32(0)))
-        candidate_column = low_column + below(words[0], columns)
-        candidate_row = low_row + below(words[1], rows)
-        if dr.hint(active & (attempt == ATTEMPTS), exclude=[backend, first, canvas, settings]):
-            if dr.hint(admissible == 0, exclude=[backend, first, canvas, settings]):
-                admissible, _, _ = _scan(
-                    backend, first, canvas, low_column, columns, low_row, rows, eye, depth_range, 0xFFFFFFFF
-                )
-            _, candidate_column, candidate_row = _scan(
-                backend,
-                first,
-                canvas,
-                low_column,
-                columns,
-                low_row,
-                rows,
-                eye,
-                depth_range,
-                below(words[0], admissible),
-            )
-        taken = active & _admissible(
-            backend, first, canvas, candidate_column, candidate_row, eye, depth_range
-        )
-        found = dr.gather(
-            backend.Vector3, first.color, first.index(backend, candidate_column, candidate_row), taken
-        )
-        total += dr.select(taken, found, 0)
-        drawn += dr.select(taken, backend.UInt32(1), 0)
-        attempt = dr.select(taken, 0, attempt + 1)
+        guesses = attempt < ATTEMPTS
+        at_column = dr.select(guesses, low_column + below(words[0], columns), walk_column)
+        at_row = dr.select(guesses, low_row + below(words[1], rows), walk_row)
+        fits = _admissible(backend, first, canvas, at_column, at_row, eye, depth_range)
+        chosen = (admissible > 0) & (passed == below(words[0], admissible))
+        taken = active & fits & (guesses | chosen)
+        found = dr.gather(backend.Vector3, first.color, first.index(backend, at_column, at_row), taken)
+        total += dr.select(taken, found - own, 0)
+        drawn += dr.select(taken, one, none)
+
+        # ---- The next pixel of the walk; back to its start when it ends ----
+        passed += dr.select(fits & ~guesses, one, none)
+        row_ends = at_column + 1 == low_column + columns
+        window_ends = row_ends & (at_row + 1 == low_row + rows)
+        admissible = dr.select(~guesses & window_ends & (admissible == 0), passed, admissible)
+        restarts = guesses | taken | window_ends
+        passed = dr.select(restarts, 0, passed)
+        walk_row = dr.select(restarts, low_row, dr.select(row_ends, walk_row + 1, walk_row))
+        walk_column = dr.select(restarts | row_ends, low_column, walk_column + 1)
+        attempt = dr.select(taken, none, dr.select(guesses, attempt + 1, attempt))
         active &= drawn < samples
-    return dr.select(sharp & (reach > 0), total / backend.Float(samples), own)
+    return own + total / backend.Float(samples)
 
 
 def _window(backend: Backend, center: Any, reach: Any, low: int, high: int) -> tuple[Any, Any]:
@@ -164,35 +162,3 @@ def _admissible(
     depth = dr.gather(backend.Float, first.depth, first.index(backend, column, row))
     distance = _eye_distance(backend, canvas, column, row) + depth
     return (depth > 0) & (dr.abs(distance - eye) < depth_range)
-
-
-@dr.syntax
-def _scan(
-    backend: Backend,
-    first: _FirstPass,
-    canvas: Canvas,
-    low_column: Any,
-    columns: Any,
-    low_row: Any,
-    rows: Any,
-    eye: Any,
-    depth_range: Any,
-    wanted: Any,
-) -> tuple[Any, Any, Any]:
-    """Counts the admissible pixels of a window in row-major order, up to number `wanted`; returns the count before
-    it, and its column and row."""
-    width = dr.width(low_column)
-    count = dr.zeros(backend.UInt32, width)
-    column, row = low_column + 0, low_row + 0
-    wanted = dr.full(backend.UInt32, 0, width) + wanted
-    searching = dr.full(backend.Bool, True, width)
-    while dr.hint(searching, label="count the window", exclude=[backend, first, canvas]):
-        fits = _admissible(backend, first, canvas, column, row, eye, depth_range)
-        here = fits & (count == wanted)
-        count += dr.select(fits & ~here, backend.UInt32(1), 0)
-        last_column = column + 1 == low_column + columns
-        last = last_column & (row + 1 == low_row + rows)
-        searching = ~here & ~last
-        column = dr.select(searching, dr.select(last_column, low_column, column + 1), column)
-        row = dr.select(searching & last_column, row + 1, row)
-    return count, column, row

@@ -47,12 +47,12 @@ class Plane(ShapeRecord):
             raise Refusal("is parallel to `u`; allowed: two directions that span a plane", "v")
         return self
 
-    def slot(self, backend: Backend, primitive: int, plane_number: int) -> PlaneSlot:
-        """This plane for a kernel; `plane_number` counts the planes of the scene."""
-        a, b, c, d = self.placed_coefficients()
+    @staticmethod
+    def slot(backend: Backend, row: np.ndarray, primitive: int, plane_number: int) -> PlaneSlot:
+        """The plane with that row (n, d) for a kernel; `plane_number` counts the planes of the scene."""
         return PlaneSlot(
-            n=backend.opaque_vector((a, b, c)),
-            d=backend.opaque(d),
+            n=backend.opaque_vector(row[:3]),
+            d=backend.opaque(row[3]),
             primitive=backend.opaque_id(primitive),
             bit=plane_number if plane_number < SIDE_BITS else None,
         )

@@ -23,9 +23,9 @@ class Sphere(ShapeRecord):
     radius: Positive = Field(description="radius, in scene units")
     scale: Positive = Field(default=1.0, description="factor of center and radius, about the origin")
 
-    def slot(self, backend: Backend, primitive: int, plane_number: int) -> SphereSlot:
-        """This sphere for a kernel."""
-        row = self.placed_coefficients()
+    @staticmethod
+    def slot(backend: Backend, row: np.ndarray, primitive: int, plane_number: int) -> SphereSlot:
+        """The sphere with that row (center, radius) for a kernel."""
         return SphereSlot(
             center=backend.opaque_vector(row[:3]),
             radius=backend.opaque(row[3]),

@@ -25,7 +25,7 @@ class SphereTable:
     count: Any
 
     @staticmethod
-    def of(backend: Backend, rows: list[np.ndarray], primitives: list[int]) -> SphereTable:
+    def of(backend: Backend, rows: np.ndarray, primitives: np.ndarray) -> SphereTable:
         """The table of n spheres with `rows` (n, 4) and their primitive ids."""
         return SphereTable(
             backend,

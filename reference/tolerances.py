@@ -1,0 +1,65 @@
+"""All tolerances of the accuracy suite in one table: the name, the value, why it is so large, and where it comes from.
+
+Units: `eps` is the unit roundoff, 2^-24 in single and 2^-53 in double precision; S is the largest |coordinate| of the
+scene, ray origins included; theta the angle between a ray and the normal of what it hits.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+EPSILON = {"single": 2.0**-24, "double": 2.0**-53}
+
+
+class Tolerance(NamedTuple):
+    """One row of the table; `source` is a section of the document or the measurement behind the number."""
+
+    value: float
+    unit: str
+    reason: str
+    source: str
+
+
+TOLERANCES: dict[str, Tolerance] = {
+    "distance": Tolerance(
+        16, "eps S", "|dt cos theta|: o, d and the plane's d are each rounded once, n.o and n.d add 3 + 3 products", "5"
+    ),
+    "position": Tolerance(
+        16, "eps S", "|dp.n|: the point is put back onto its surface, which costs one n.p", "5"
+    ),
+    "normal": Tolerance(
+        16, "eps S / (r cos theta)", "a sphere's normal turns by dp / r, and dp along the surface is dt", "5"
+    ),
+    "color, double": Tolerance(
+        1e-9, "display value", "eps S times the gain of 20 bounces on curved mirrors (up to 1e3 each way)", "9"
+    ),
+    "color, single": Tolerance(1e-4, "display value", "a fortieth of a step of 8 bits, away from edges", "9"),
+    "depth, double": Tolerance(1e-11, "S", "16 eps S at cos theta > 2e-4", "7"),
+    "edge pixels": Tolerance(
+        0.08, "share", "pixels whose double-precision color moves with single rounding of the canvas", "measured"
+    ),
+    "differing rays": Tolerance(
+        0.002, "share", "single: a ray whose branch rounding decides may be counted otherwise", "measured"
+    ),
+    "white": Tolerance(4, "ulp of 1", "shares w / sum w, the sum of D and H, and a + (1-a) x round once each", "2"),
+    "moved": Tolerance(
+        128, "eps (S + 2000) / r", "a scene moved by 2000 rounds every coordinate to eps (S + 2000); a normal turns by "
+        "that over the radius, colors of rooms without mirrors change by at most 8 such turns times 16", "5"
+    ),
+    "contact distance": Tolerance(32, "eps S", "|dt cos theta| from a start that is itself 8 eps S off", "5"),
+    "arrival cosine": Tolerance(
+        0.25,
+        "cosine",
+        "a ray that arrives at a smaller angle knows where it is along the surface only to eps S / cosine, which is "
+        "more than the 8 eps S of the contact rules",
+        "5",
+    ),
+    "doubtful": Tolerance(0.08, "share", "rays whose truth rounding of the start decides", "measured"),
+    "fronting": Tolerance(1e-3, "rad", "both faces of an edge front the ray by more than this", "5"),
+}  # fmt: skip
+
+
+def bound(name: str, precision: str = "double", extent: float = 1.0) -> float:
+    """The tolerance as a number: rows in `eps S` need the precision and S."""
+    row = TOLERANCES[name]
+    return row.value * EPSILON[precision] * extent if row.unit.startswith("eps") else row.value

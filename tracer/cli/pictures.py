@@ -1,0 +1,171 @@
+"""What `tracer render` does: plan, trace, save, tell; one scene after the other."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tracer.backends import find_backend
+from tracer.cli.failures import report, talk
+from tracer.cli.interruption import Interruption
+from tracer.cli.plan import Job, make_plan, partial_file
+from tracer.cli.progress import make_reporter
+from tracer.cli.statistics import KernelRecord, format_statistics, seconds_since_start
+from tracer.film.result import Result
+from tracer.render import RenderInterrupted, render
+from tracer.scene_warnings import warnings_of
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """The options of `tracer render`, as click delivers them."""
+
+    outputs: tuple[str, ...]
+    overrides: tuple[str, ...]
+    allow_outside: bool
+    scale: float
+    resolution: tuple[int, int] | None
+    supersample: int | None
+    crop: tuple[int, int, int, int] | None
+    precision: str
+    backend: str
+    threads: int | None
+    aovs: tuple[str, ...]
+    bits: str
+    alpha: bool
+    half: bool
+    seed: int | None
+    stats: bool
+    quiet: bool
+    progress: str
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The arguments of `tracer.render`."""
+        names = ("scale", "resolution", "supersample", "crop", "precision", "backend", "threads", "seed")
+        return {name: getattr(self, name) for name in names} | {"aovs": ("depth", *self.aovs)}
+
+    @property
+    def file_options(self) -> dict[str, Any]:
+        """The arguments of `Result.save`."""
+        return {"bits": int(self.bits), "alpha": self.alpha, "half": self.half}
+
+    @property
+    def reporter(self) -> str:
+        """Which kind of progress is shown."""
+        return "none" if self.quiet and self.progress == "auto" else self.progress
+
+
+def render_scenes(sources: Sequence[str], wishes: Wishes, interruption: Interruption) -> int:
+    """Renders all scenes and returns the exit code."""
+    interruption.quiet = wishes.quiet
+    imported = seconds_since_start()
+    plan = make_plan(sources, wishes.outputs, wishes.overrides, wishes.allow_outside, wishes.settings)
+    if not plan.jobs:
+        return plan.worst
+    find_backend(wishes.backend, wishes.precision)
+    if wishes.aovs and not any(
+        Path(file).suffix.lower() != ".png" for job in plan.jobs for file in job.files
+    ):
+        _warn("the layers of --aov go to .exr and .npz files, and -o names none", wishes)
+    worst = plan.worst
+    for job in plan.jobs:
+        try:
+            worst = max(worst, _Picture(job, wishes, interruption, imported).make())
+        except Exception as error:
+            interruption.check()
+            worst = max(worst, report(error))
+        interruption.check()
+        imported = 0.0
+    return worst
+
+
+class _Picture:
+    """One picture on its way from the scene to the files."""
+
+    def __init__(self, job: Job, wishes: Wishes, interruption: Interruption, imported: float) -> None:
+        self._job, self._wishes, self._interruption = job, wishes, interruption
+        self._seconds = {"imports": imported, "load": job.load_seconds}
+        self._pixels_done = 0
+
+    def make(self) -> int:
+        """Traces and saves; returns the exit code."""
+        started = time.perf_counter()
+        for warning in warnings_of(self._job.scene):
+            _warn(warning, self._wishes)
+        self._seconds["load"] += time.perf_counter() - started
+        kernels = KernelRecord(self._wishes.stats)
+        try:
+            with kernels:
+                result = self._trace()
+        except RenderInterrupted as interrupted:
+            self._save_partial(interrupted.partial)
+            return self._interruption.exit_code
+        writing = time.perf_counter()
+        for file in self._job.files:
+            result.save(file, **self._wishes.file_options)
+        self._seconds |= _phases(result) | {"write": time.perf_counter() - writing}
+        self._tell(result, kernels, self._job.load_seconds + time.perf_counter() - started)
+        return 0
+
+    def _trace(self) -> Result:
+        """The picture; `RenderInterrupted` also where the user's wish to stop came after the last ray."""
+        reporter = make_reporter(self._wishes.reporter, self._job.scene.name)
+
+        def progress(done: int, total: int, rays: int) -> None:
+            self._pixels_done = done
+            reporter.update(done, total, rays)
+            self._interruption.check()
+
+        try:
+            with self._interruption.deferred():
+                result = render(self._job.scene, progress=progress, **self._wishes.settings)
+                if self._interruption.requested:
+                    raise RenderInterrupted(result)
+        finally:
+            reporter.close()
+        return result
+
+    def _tell(self, result: Result, kernels: KernelRecord, seconds: float) -> None:
+        lost = result.stats["ended_by_depth"]
+        if lost:
+            _warn(
+                f"{self._job.scene.name}: max_depth = {self._job.scene.max_depth} ended {lost} "
+                f"path{'s' if lost > 1 else ''} whose light is missing",
+                self._wishes,
+            )
+        if self._wishes.stats:
+            click.echo(format_statistics(result.stats, self._seconds, kernels))
+        if not self._wishes.quiet:
+            height, width = result.depth.shape
+            speed = sum(result.stats["rays"].values()) / max(result.stats["seconds"]["trace"], 1e-9) / 1e6
+            files = ", ".join(self._job.files)
+            click.echo(f"{files}  {width}x{height}  {seconds:.2f} s  {speed:.1f} Mrays/s")
+
+    def _save_partial(self, partial: Result) -> None:
+        """Saves the finished rows beside the first output and says how to render the others."""
+        file = partial_file(self._job.files[0])
+        partial.save(file, **self._wishes.file_options)
+        x0, y0, x1, y1 = partial.crop or (0, 0, *partial.depth.shape[::-1])
+        end = y0 + self._pixels_done // (x1 - x0)
+        if end < y1:
+            rest = f"rows {y0} to {end - 1}; --crop {x0} {end} {x1} {y1} renders the others"
+        else:
+            rest = "all rows; only what comes after them is missing, so render it again"
+        talk(f"{self._interruption.reason}: {file} holds what was finished of {self._job.source}: {rest}")
+
+
+def _phases(result: Result) -> dict[str, float]:
+    """The seconds of `tracer.render` by phase, under the names of the report."""
+    seconds = result.stats["seconds"]
+    return {"tables": seconds["compile"], "trace": seconds["trace"], "filter": seconds["filter"]}
+
+
+def _warn(text: str, wishes: Wishes) -> None:
+    if not wishes.quiet:
+        talk(f"warning: {text}")

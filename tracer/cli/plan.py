@@ -1,0 +1,101 @@
+"""Everything that can be refused before the first ray: scenes, file names, ranges."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tracer.cli.failures import report
+from tracer.errors import OutputError, TracerError, UsageError
+from tracer.film.atomic import check_writable, fill_template
+from tracer.render import Settings, _canvas, _checked, _rectangle
+from tracer.scene import Scene, find_scene, load
+
+DEFAULT_OUTPUT = "{name}.png"
+
+
+@dataclass(frozen=True)
+class Job:
+    """One picture: its scene, as the user called it and loaded, and the files it goes to."""
+
+    source: str
+    scene: Scene
+    files: tuple[str, ...]
+    load_seconds: float
+
+
+@dataclass
+class Plan:
+    """What is to be rendered, and the worst exit code of what is not."""
+
+    jobs: list[Job]
+    worst: int = 0
+
+    def refuse(self, error: TracerError) -> None:
+        """Says what is wrong with one scene; the others go on."""
+        self.worst = max(self.worst, report(error))
+
+
+def make_plan(
+    sources: Sequence[str],
+    templates: Sequence[str],
+    overrides: Sequence[str],
+    allow_outside: bool,
+    settings: dict[str, Any],
+) -> Plan:
+    """Loads and checks all scenes; a bad one is reported and left out.
+
+    Raises `UsageError` or `OutputError` for what concerns them all: options, files that cannot be written.
+    """
+    checked = _checked(Settings(**settings))
+    plan = Plan([])
+    files = _output_files(sources, templates or (DEFAULT_OUTPUT,), plan)
+    for source in files:
+        started = time.perf_counter()
+        try:
+            scene = load(source, allow_outside=allow_outside, overrides=overrides)
+            _rectangle(checked.crop, _canvas(scene, checked))
+        except TracerError as error:
+            plan.refuse(error)
+        else:
+            plan.jobs.append(Job(source, scene, files[source], time.perf_counter() - started))
+    return plan
+
+
+def _output_files(sources: Sequence[str], templates: Sequence[str], plan: Plan) -> dict[str, tuple[str, ...]]:
+    """The files of every scene that exists; each file belongs to one scene and can be written."""
+    files: dict[str, tuple[str, ...]] = {}
+    owners: dict[str, str] = {}
+    for source in sources:
+        try:
+            name = find_scene(source)[0].stem
+        except TracerError as error:
+            plan.refuse(error)
+            continue
+        files[source] = tuple(fill_template(template, name) for template in templates)
+        for file in files[source]:
+            _claim(file, source, owners)
+            check_writable(file)
+    return files
+
+
+def _claim(file: str, source: str, owners: dict[str, str]) -> None:
+    real = os.path.realpath(file)
+    if real in owners:
+        other = owners[real]
+        who = f"twice for {source}" if other == source else f"for {other} and for {source}"
+        raise UsageError(
+            f"{file}: would be written {who}; allowed: a file of its own each, such as -o {{name}}.png"
+        )
+    owners[real] = source
+
+
+def partial_file(file: str) -> str:
+    """Where an interrupted picture goes: `out/a.partial.png` for `out/a.exr`; raises `OutputError`."""
+    name = f"{os.path.splitext(file)[0]}.partial.png"
+    if os.path.isdir(name):
+        raise OutputError(f"{name}: is a folder, so the interrupted picture is lost")
+    return name

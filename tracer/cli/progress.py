@@ -1,0 +1,81 @@
+"""How far a render is: a bar, JSON lines or nothing, on stderr."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from typing import Any, Protocol
+
+import click
+
+KINDS = ("auto", "bar", "json", "none")
+
+
+class Reporter(Protocol):
+    """Takes news of one picture."""
+
+    def update(self, done: int, total: int, rays: int) -> None:
+        """So many pixels of all are finished, with so many rays so far."""
+
+    def close(self) -> None:
+        """The picture is over, finished or not."""
+
+
+def make_reporter(kind: str, name: str) -> Reporter:
+    """The reporter for `--progress`; `auto` is a bar on a terminal and nothing elsewhere."""
+    if kind == "auto":
+        kind = "bar" if sys.stderr is not None and sys.stderr.isatty() else "none"
+    return _Bar(name) if kind == "bar" else _JsonLines() if kind == "json" else _Silence()
+
+
+class _Silence:
+    def update(self, done: int, total: int, rays: int) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
+
+
+class _JsonLines:
+    """One object a line: pixels done and in all, rays and seconds so far."""
+
+    def __init__(self) -> None:
+        self._started = time.perf_counter()
+
+    def update(self, done: int, total: int, rays: int) -> None:
+        seconds = round(time.perf_counter() - self._started, 3)
+        click.echo(json.dumps({"done": done, "total": total, "rays": rays, "seconds": seconds}), err=True)
+
+    def close(self) -> None:
+        pass
+
+
+class _Bar:
+    """A bar with elapsed and remaining time and rays a second; a second pass starts a new one."""
+
+    FORMAT = "{desc} {percentage:3.0f} % |{bar}| {elapsed} elapsed, {remaining} remaining{postfix}"
+
+    def __init__(self, name: str) -> None:
+        self._name, self._started = name, time.perf_counter()
+        self._bar: Any = self._new_bar(None)
+
+    def update(self, done: int, total: int, rays: int) -> None:
+        if done < self._bar.n:
+            self._bar.close()
+            self._bar = self._new_bar(total)
+        self._bar.total = total
+        speed = rays / (time.perf_counter() - self._started) / 1e6
+        self._bar.set_postfix_str(f"{speed:.1f} Mrays/s", refresh=False)
+        self._bar.update(done - self._bar.n)
+        if done == total:
+            self._bar.refresh()  # tqdm draws ten times a second at most
+
+    def close(self) -> None:
+        self._bar.close()
+
+    def _new_bar(self, total: int | None) -> Any:
+        from tqdm import tqdm
+
+        tqdm.monitor_interval = 0  # no thread of its own
+        return tqdm(total=total, desc=self._name, file=sys.stderr, leave=False, bar_format=self.FORMAT)
