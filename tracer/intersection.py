@@ -16,7 +16,7 @@ from tracer.acceleration.traverse import visit_triangles
 from tracer.acceleration.triangle import TriangleTest, gather_triangle
 from tracer.backends import INVALID
 from tracer.device_scene import KIND_UNIT, MESH, PLANE, SPHERE, DeviceScene
-from tracer.ray import Hit, Ray, Segment, departure_word, keep_nearer, no_hit, normalize, select_max
+from tracer.ray import Hit, Ray, Segment, departure_word, keep_nearer, max_abs, no_hit, normalize, select_max
 from tracer.shapes.plane import PlaneSlot
 from tracer.shapes.sphere import SphereSlot
 
@@ -29,7 +29,7 @@ class Surface:
 
     `p`: the hit point, moved onto the surface; `outward`: geometric unit normal; `normal`: shading normal that faces
     the ray; `entering`: the ray comes from the side that `outward` points to; `lit_side`: geometric normal facing the
-    ray; `shape`, `primitive`: numbers; `ids`: the shape's row of `DeviceScene.ids`.
+    ray; `shape`, `primitive`: numbers; `ids`: the shape's row of `DeviceScene.ids`; `view`: see `Ray`.
     """
 
     p: Any
@@ -40,13 +40,15 @@ class Surface:
     shape: Any
     primitive: Any
     ids: Any
+    view: Any
 
 
 def free_ray(scene: DeviceScene, o: Any, d: Any) -> Ray:
     """A ray that starts anywhere: it leaves nothing, and its sides are computed."""
     backend = scene.backend
     width = max(dr.width(o), dr.width(d))
-    return Ray(o, d, dr.full(backend.UInt32, INVALID, width), plane_sides(scene, o, d))
+    view = None if scene.triangles is None else dr.zeros(backend.Vector3, width)
+    return Ray(o, d, dr.full(backend.UInt32, INVALID, width), plane_sides(scene, o, d), view)
 
 
 def plane_sides(scene: DeviceScene, o: Any, d: Any) -> Any:
@@ -129,7 +131,9 @@ def transmittance(scene: DeviceScene, segment: Segment, active: Any) -> Any:
             state=share,
             limit=lambda share: dr.select(share > 0, segment.length, never),
             visit=lambda share, _t, primitive, test, valid: dr.select(
-                valid & test.owned & ~_holds_light(segment, test), share * _refraction_of(scene, primitive), share
+                valid & ~_holds_light(segment, test),
+                share * _crossed(_refraction_of(scene, primitive), test.owned),
+                share,
             ),
             active=active,
         )
@@ -143,6 +147,12 @@ def _holds_light(segment: Segment, test: TriangleTest) -> Any:
 
 def _refraction_of(scene: DeviceScene, primitive: Any) -> Any:
     return dr.gather(scene.backend.Float, scene.surfaces, shape_of(scene, primitive, True) * 8 + 2)
+
+
+def _crossed(factor: Any, owned: Any) -> Any:
+    """The factor of a surface that is crossed; exactly on an edge only one of two neighbors counts, but an opaque
+    one always does."""
+    return dr.select(owned | (factor == 0), factor, 1)
 
 
 def _power_0_1_2(factor: Any, count: Any) -> Any:
@@ -169,7 +179,11 @@ def surface_at(scene: DeviceScene, ray: Ray, hit: Hit, active: Any) -> Surface:
     normal = lit_side
     if scene.smooth is not None:
         normal = _smooth_normal(scene, shape, hit.primitive, p, ray.d, lit_side, entering, active)
-    return Surface(p, outward, normal, lit_side, entering, shape, hit.primitive, ids)
+    view = None
+    if scene.triangles is not None:
+        at_origin = ray.departing & (hit.t <= 8 * backend.epsilon * max_abs(p))
+        view = dr.select(at_origin, ray.view, -ray.d)  # a ray that did not move has seen nothing new
+    return Surface(p, outward, normal, lit_side, entering, shape, hit.primitive, ids, view)
 
 
 def _geometry_at(
@@ -256,8 +270,9 @@ def departure(scene: DeviceScene, ray: Ray) -> Departure:
         active=active,
         primitive=primitive,
         normal=normal,
-        reference=dr.select(is_mesh, triangle.centroid(), center),
-        has_reference=active & (kind != PLANE),
+        corners=tuple(dr.select(is_mesh, v, center) for v in (triangle.v0, triangle.v1, triangle.v2)),
+        reach=dr.select(kind == SPHERE, row.w, dr.select(kind == PLANE, float("inf"), 0)),
+        view=ray.view,
         climb=select_max(climb, backend.Float(0)),
     )
 
@@ -266,4 +281,4 @@ def leave(ray: Ray, surface: Surface, d: Any, crosses: bool) -> Ray:
     """The ray that leaves a surface in direction d: on the side it came from, or through it."""
     inside = surface.entering if crosses else ~surface.entering
     sides = ray.sides ^ surface.ids.w if crosses else ray.sides
-    return Ray(surface.p, d, departure_word(surface.primitive, inside), sides)
+    return Ray(surface.p, d, departure_word(surface.primitive, inside), sides, surface.view)

@@ -11,6 +11,9 @@ one side or the other. Instead of pushing it away, the ray carries what is known
 * `sides`: one bit for each of the first 32 planes, set when the origin lies on the positive side. Nothing but
   crossing a plane changes its bit, so a ray can neither lose a plane that it starts next to nor hit it twice.
 
+* `view`: in scenes with meshes, the direction towards where the starting point was seen from. It tells on which side
+  of a triangle the point is when rounding cannot (`acceleration/departure.py`).
+
 Plain dataclasses with no defaults: frozen ones cannot be loop state, defaults would be shared.
 """
 
@@ -30,17 +33,18 @@ SIDE_BITS = 32
 
 @dataclass
 class Ray:
-    """n rays. `o`, `d`: (3, n), `departure`, `sides`: (n,) unsigned."""
+    """n rays. `o`, `d`: (3, n), `departure`, `sides`: (n,) unsigned, `view`: (3, n), None in a scene without meshes."""
 
     o: Any
     d: Any
     departure: Any
     sides: Any
+    view: Any
 
     @property
     def departing(self) -> Any:
-        """Mask: the ray starts on a surface of the scene."""
-        return self.departure != INVALID
+        """Mask: the ray starts on a surface of the scene (a lane that hit nothing leaves nothing)."""
+        return (self.departure >> 1) != (INVALID >> 1)
 
     def leaves(self, primitive: Any) -> Any:
         """Mask: the ray starts on that primitive (the word of a free ray names none)."""

@@ -74,10 +74,11 @@ def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid) ->
     # ---- Loop state, all of it in full width ----
     backend = scene.backend
     width = dr.width(pixels.number)
-    path = dr.zeros(path_type(backend), width)  # the ray in hand
+    record = path_type(backend, scene.triangles is not None)
+    path = dr.zeros(record, width)  # the ray in hand
     fresh = dr.full(backend.Bool, True, width)  # ... is still to be made from the next sub-ray
     sub_ray = dr.zeros(backend.UInt32, width)  # number of the current sub-ray
-    stack = dr.alloc_local(path_type(backend), scene.stack_size)  # rays that wait
+    stack = dr.alloc_local(record, scene.stack_size)  # rays that wait
     top = dr.zeros(backend.UInt32, width)  # how many of them
     color = dr.zeros(backend.Vector3, width)  # sum over the sub-rays
     hits = dr.zeros(backend.UInt32, width)  # sub-rays that hit something
@@ -88,9 +89,9 @@ def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid) ->
     counts = Counts.zero(backend, width)
     active = backend.Bool(pixels.active)
 
-    while dr.hint(active, label="whitted", exclude=[scene, canvas, pixels, backend]):
+    while dr.hint(active, label="whitted", exclude=[scene, canvas, pixels, backend, record]):
         # ---- The next sub-ray of the pixel ----
-        if dr.hint(fresh, exclude=[scene, canvas, pixels, backend]):
+        if dr.hint(fresh, exclude=[scene, canvas, pixels, backend, record]):
             path = _primary(scene, canvas, pixels, sub_ray)
 
         # ---- The nearest surface ----
@@ -134,11 +135,11 @@ def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid) ->
 
         # ---- Go on with one of them, or one that waits, or the next sub-ray ----
         path = dr.select(refracts, children.refracted, children.reflected)
-        if dr.hint(reflects & refracts, exclude=[scene, canvas, pixels, backend]):
+        if dr.hint(reflects & refracts, exclude=[scene, canvas, pixels, backend, record]):
             stack.write(children.reflected, top)
             top += 1
         pops = active & ~reflects & ~refracts & (top > 0)
-        if dr.hint(pops, exclude=[scene, canvas, pixels, backend]):
+        if dr.hint(pops, exclude=[scene, canvas, pixels, backend, record]):
             top -= 1
             path = stack.read(top)
         fresh = active & ~reflects & ~refracts & ~pops

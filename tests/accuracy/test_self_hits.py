@@ -37,7 +37,7 @@ def check(kind: str, shapes: int, rays: int, precision: str) -> None:
             found = bounce(device, o, d_in, d_out, crosses, 1e3 * size)
             side = (found.outward * d_out).sum(axis=1) * np.where(found.entering, 1, -1) * (-1 if crosses else 1)
             used = found.valid & (side > 1e-4)
-            assert used.sum() > 0.05 * rays
+            assert used.sum() > 0.02 * rays
             inside = used & (found.entering == crosses) if kind == "sphere" else np.zeros(rays, bool)
             wrong = used & (found.next_valid != inside)
             if kind == "sphere":
@@ -54,7 +54,7 @@ def check(kind: str, shapes: int, rays: int, precision: str) -> None:
 @pytest.mark.parametrize("precision", ["single", "double"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_self_intersection(kind: str, precision: str) -> None:
-    check(kind, 25, 1000, precision)
+    check(kind, 12, 1000, precision)
 
 
 @pytest.mark.slow

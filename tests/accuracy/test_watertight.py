@@ -57,7 +57,7 @@ def aimed(name: str, target: str, seed: int) -> tuple[Array, Array, Array, Array
         around[faces, np.arange(len(faces))[:, None]] = True
         cosine = np.where(around[edges[k, 0]], -(d @ normals.T), 1)
     fronting = cosine.min(axis=1) > TOLERANCES["fronting"].value
-    o = (point - size * rng.uniform(0.5, 5, (2 * RAYS, 1)) * d)[fronting][:RAYS]
+    o = (point - size * rng.uniform(3, 6, (2 * RAYS, 1)) * d)[fronting][:RAYS]
     point = point[fronting][:RAYS]
     return vertices, faces, o, point - o
 

@@ -20,6 +20,10 @@ from tracer.ray import Ray, max_abs, select_max, select_min
 TRIANGLE_WORDS = 12
 """Floats of a triangle in its table: three corners, unit normal (zero: degenerate, never hit)."""
 
+CONTACT_SLACK = 32
+"""Bound on the error of a hit point, in units of eps S: 8 across its surface, and up to 4 times that along it when the
+ray arrived at a slant (cosine above 1/4). A generous bound costs nothing, since what it admits is decided by geometry."""
+
 
 @dataclass
 class Triangle:
@@ -29,10 +33,6 @@ class Triangle:
     v1: Any
     v2: Any
     normal: Any
-
-    def centroid(self) -> Any:
-        """The middle, a point that is surely on the triangle's own side of any plane through one of its edges."""
-        return (self.v0 + self.v1 + self.v2) / 3
 
 
 @dataclass
@@ -77,8 +77,8 @@ class TriangleTest:
     `t`: distance to the plane, of either sign; `within`: the line passes inside the edges or exactly through one;
     `owned`: the same, but of two triangles that share the edge only one claims it; `touched`: the line passes inside, or
     misses an edge by no more than rounding; `height`: signed distance of the ray's origin from the plane; `speed`:
-    rate at which it grows; `slack`: a bound on the rounding error of `height`, 8 eps S with S the largest coordinate of
-    the origin and of the corners seen from it.
+    rate at which it grows; `slack`: a bound on the rounding error of `height`, `relative_slack` (32 eps) times the largest
+    coordinate of the origin and of the corners seen from it.
     """
 
     t: Any
@@ -88,6 +88,7 @@ class TriangleTest:
     height: Any
     speed: Any
     slack: Any
+    relative_slack: float
 
 
 def meet_triangle(epsilon: float, triangle: Triangle, ray: Ray, axes: Projection) -> TriangleTest:
@@ -100,7 +101,8 @@ def meet_triangle(epsilon: float, triangle: Triangle, ray: Ray, axes: Projection
     e1 = difference_of_products(cx, ay, cy, ax)
     e2 = difference_of_products(ax, by, ay, bx)
     size = select_max(select_max(max_abs(a), max_abs(b)), max_abs(c))
-    slack = 8 * epsilon * select_max(size, max_abs(ray.o))
+    relative_slack = CONTACT_SLACK * epsilon
+    slack = relative_slack * select_max(size, max_abs(ray.o))
     low = select_min(select_min(e0, e1), e2)
     high = select_max(select_max(e0, e1), e2)
     height = -dr.dot(triangle.normal, a)
@@ -115,6 +117,7 @@ def meet_triangle(epsilon: float, triangle: Triangle, ray: Ray, axes: Projection
         height=height,
         speed=speed,
         slack=slack,
+        relative_slack=relative_slack,
     )
 
 

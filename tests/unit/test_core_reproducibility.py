@@ -1,0 +1,125 @@
+"""The same bytes however a picture is computed, and no new kernel when only numbers change."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import numpy as np
+import pytest
+
+import tracer
+from tests.accuracy import worlds
+
+
+def picture(table: dict[str, Any], **settings: Any) -> tracer.Result:
+    return tracer.render(tracer.load(table), aovs=("depth", "normal", "shape"), **settings)
+
+
+def same_bytes(a: tracer.Result, b: tracer.Result) -> bool:
+    layers = all(a.aovs[name].tobytes() == b.aovs[name].tobytes() for name in a.aovs)
+    return a.color.tobytes() == b.color.tobytes() and a.depth.tobytes() == b.depth.tobytes() and layers
+
+
+@pytest.mark.parametrize("rays_per_band", [1, 300, 1000, 5000])
+def test_band_size_changes_no_byte(rays_per_band: int) -> None:
+    table = worlds.FEATURES["disk jitter"]()
+    whole, bands = picture(table), picture(table, rays_per_band=rays_per_band)
+    assert same_bytes(whole, bands)
+    rays = {key: value for key, value in whole.stats.items() if key != "seconds"}
+    assert rays == {key: value for key, value in bands.stats.items() if key != "seconds"}
+
+
+def test_thread_count_changes_no_byte() -> None:
+    table = worlds.FEATURES["disk jitter"]()
+    assert same_bytes(picture(table, threads=1), picture(table, threads=2))
+
+
+@pytest.mark.parametrize("crop", [(0, 0, 9, 7), (13, 5, 32, 24)])
+def test_crop_changes_no_byte(crop: tuple[int, int, int, int]) -> None:
+    table = worlds.FEATURES["disk jitter"]()
+    x0, y0, x1, y1 = crop
+    assert np.array_equal(picture(table, crop=crop).color, picture(table).color[y0:y1, x0:x1])
+
+
+def test_a_supersampled_pixel_is_the_mean_of_finer_pixels() -> None:
+    table = worlds.room()
+    camera = table["camera"] | {"resolution": [64, 48], "pixel_size": table["camera"]["pixel_size"] / 2}
+    fine = picture(table | {"camera": camera}, precision="double").color
+    coarse = picture(table, precision="double", supersample=2).color
+    assert np.abs(fine.reshape(24, 2, 32, 2, 3).mean(axis=(1, 3)) - coarse).max() < 1e-12
+
+
+UPLOAD = 100
+"""Operations: smaller kernels only copy NumPy's memory to the device, in variants by its alignment."""
+
+
+def kernels_of(table: dict[str, Any], **settings: Any) -> list[dict[str, Any]]:
+    """The kernels that one render launches."""
+    scene = tracer.load(table)
+    dr.kernel_history_clear()
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        tracer.render(scene, **settings)
+        return [entry for entry in dr.kernel_history() if entry["type"] == dr.KernelType.JIT]
+
+
+def changed(path: str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """A room with another number in one place, and settings."""
+    table, settings = worlds.room(), {}
+    table["shapes"] = [dict(shape) for shape in table["shapes"]]
+    table["lights"] = [dict(light) for light in table["lights"]]
+    if path == "color":
+        table["shapes"][4]["color"] = "#123456"
+    elif path == "position":
+        table["shapes"][3]["center"] = [0.5, 1.3, 1.0]
+    elif path == "camera angle":
+        table["camera"] = table["camera"] | {"rotate": [3.0, -4.0]}
+    elif path == "light weight":
+        table["lights"][0]["weight"] = 5.0
+    elif path == "material":
+        table["materials"] = table["materials"] | {"glass": worlds.GLASS | {"ior": 1.7, "refraction": 0.6}}
+    elif path == "mesh":
+        table["shapes"][5]["translate"] = [3.5, 1.4, -2.5]
+    elif path == "supersample":
+        settings["supersample"] = 3
+    return table, settings
+
+
+@pytest.mark.parametrize(
+    "path", ["color", "position", "camera angle", "light weight", "material", "mesh", "supersample"]
+)
+def test_a_change_of_numbers_compiles_nothing(path: str) -> None:
+    known = {entry["hash"] for entry in kernels_of(worlds.room())}
+    table, settings = changed(path)
+    kernels = [entry for entry in kernels_of(table, **settings) if entry["operation_count"] >= UPLOAD]
+    new = {entry["hash"] for entry in kernels} - known
+    assert kernels
+    assert not new, f"{path}: {len(new)} new kernels"
+
+
+def test_a_change_of_structure_is_seen_by_the_check_above() -> None:
+    known = {entry["hash"] for entry in kernels_of(worlds.room())}
+    assert {entry["hash"] for entry in kernels_of(worlds.room(transparent_shadows=True))} - known
+
+
+@pytest.mark.parametrize(("rays_per_band", "bands"), [(1 << 21, 1), (300, 3)])
+def test_one_kernel_a_band(rays_per_band: int, bands: int) -> None:
+    """The loop is one kernel; all others copy numbers and are small."""
+    kernels_of(worlds.room())
+    kernels = kernels_of(worlds.room(), rays_per_band=rays_per_band)
+    assert sum(entry["operation_count"] >= UPLOAD for entry in kernels) == bands
+
+
+@pytest.mark.slow
+def test_symbolic_and_evaluated_loops_agree() -> None:
+    table = worlds.room()
+    table["shapes"] = table["shapes"][:5]
+    table["camera"] = table["camera"] | {"resolution": [8, 6], "pixel_size": 0.9}
+    symbolic = picture(table)
+    with (
+        dr.scoped_set_flag(dr.JitFlag.SymbolicLoops, False),
+        dr.scoped_set_flag(dr.JitFlag.SymbolicConditionals, False),
+    ):
+        evaluated = picture(table)
+    assert np.abs(symbolic.color - evaluated.color).max() <= 1e-6
+    assert symbolic.stats["rays"] == evaluated.stats["rays"]
