@@ -1,6 +1,8 @@
-"""All tolerances of the accuracy suite in one table: the name, the value, why it is so large, and where it comes from.
+"""All tolerances of the accuracy suite in one table: the name, the value, why it is so large, and where it
+comes from.
 
-Units: `eps` is the unit roundoff, 2^-24 in single and 2^-53 in double precision; S is the largest |coordinate| of the
+Units: `eps` is the unit roundoff, 2^-24 in single and 2^-53 in double precision; S is the largest
+|coordinate| of the
 scene, ray origins included; theta the angle between a ray and the normal of what it hits.
 """
 
@@ -22,7 +24,10 @@ class Tolerance(NamedTuple):
 
 TOLERANCES: dict[str, Tolerance] = {
     "distance": Tolerance(
-        16, "eps S", "|dt cos theta|: o, d and the plane's d are each rounded once, n.o and n.d add 3 + 3 products", "5"
+        16,
+        "eps S",
+        "|dt cos theta|: o, d and the plane's d are rounded once each, n.o and n.d add 6 products",
+        "5",
     ),
     "position": Tolerance(
         16, "eps S", "|dp.n|: the point is put back onto its surface, which costs one n.p", "5"
@@ -31,32 +36,44 @@ TOLERANCES: dict[str, Tolerance] = {
         16, "eps S / (r cos theta)", "a sphere's normal turns by dp / r, and dp along the surface is dt", "5"
     ),
     "color, double": Tolerance(
-        1e-9, "display value", "eps S times the gain of 20 bounces on curved mirrors (up to 1e3 each way)", "9"
+        1e-9,
+        "display value",
+        "eps S times the gain of 20 bounces on curved mirrors (up to 1e3 each way)",
+        "9",
     ),
     "color, single": Tolerance(1e-4, "display value", "a fortieth of a step of 8 bits, away from edges", "9"),
     "depth, double": Tolerance(1e-11, "S", "16 eps S at cos theta > 2e-4", "7"),
     "edge pixels": Tolerance(
-        0.08, "share", "pixels whose double-precision color moves with single rounding of the canvas", "measured"
+        0.08,
+        "share",
+        "pixels whose double-precision color moves with single rounding of the canvas",
+        "measured",
     ),
     "differing rays": Tolerance(
         0.002, "share", "single: a ray whose branch rounding decides may be counted otherwise", "measured"
     ),
-    "white": Tolerance(4, "ulp of 1", "shares w / sum w, the sum of D and H, and a + (1-a) x round once each", "2"),
+    "white": Tolerance(
+        4, "ulp of 1", "shares w / sum w, the sum of D and H, and a + (1-a) x round once each", "2"
+    ),
     "moved": Tolerance(
-        128, "eps (S + 2000) / r", "a scene moved by 2000 rounds every coordinate to eps (S + 2000); a normal turns by "
-        "that over the radius, colors of rooms without mirrors change by at most 8 such turns times 16", "5"
+        4,
+        "eps (S + 2000) / r",
+        "moved by 2000 every coordinate is rounded to eps (S + 2000); a normal turns by that over the "
+        "radius r, the direction to a light by less, and a cosine by at most both",
+        "5",
     ),
     "contact distance": Tolerance(32, "eps S", "|dt cos theta| from a start that is itself 8 eps S off", "5"),
     "arrival cosine": Tolerance(
         0.25,
         "cosine",
-        "a ray that arrives at a smaller angle knows where it is along the surface only to eps S / cosine, which is "
+        "a ray that arrives at a smaller angle knows where it is along the surface only to eps S / "
+        "cosine, which is "
         "more than the 8 eps S of the contact rules",
         "5",
     ),
     "doubtful": Tolerance(0.08, "share", "rays whose truth rounding of the start decides", "measured"),
     "fronting": Tolerance(1e-3, "rad", "both faces of an edge front the ray by more than this", "5"),
-}  # fmt: skip
+}
 
 
 def bound(name: str, precision: str = "double", extent: float = 1.0) -> float:

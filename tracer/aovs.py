@@ -1,4 +1,5 @@
-"""Layers of the nearest sub-ray's hit: computed again from the pixel and the primitive, not carried by the loop."""
+"""Layers of the nearest sub-ray's hit: computed again from the pixel and the primitive, not carried by the
+loop."""
 
 from __future__ import annotations
 
@@ -65,4 +66,3 @@ def compute_layers(
     ray = free_ray(scene, o, d)
     surface = surface_at(scene, ray, Hit(found.depth, found.primitive), valid)
     return {name: LAYERS[name](scene, surface, found.primitive, valid) for name in names}
-

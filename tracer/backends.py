@@ -1,7 +1,7 @@
 """The one place that knows llvm and cuda, single and double precision, with and without gradients.
 
-A `Backend` is a record of Dr.Jit types. Every numerical function takes its types from the backend (or from its
-arguments), never from a global, so that the same code runs in every combination.
+A `Backend` is a record of Dr.Jit types. Every numerical function takes its types from the backend (or from
+its arguments), never from a global, so that the same code runs in every combination.
 """
 
 from __future__ import annotations
@@ -69,7 +69,8 @@ class Backend:
     def table(self, rows: Any) -> Any:
         """Uploads numbers as a flat `Float` table in aligned memory that Dr.Jit owns.
 
-        Only such memory is read in whole packets; a zero-copy view of NumPy's memory is not, at half the speed.
+        Only such memory is read in whole packets; a zero-copy view of NumPy's memory is not, at half the
+        speed.
         """
         return _aligned(self.Float, np.ascontiguousarray(rows, self.dtype).ravel(), self.UInt32)
 

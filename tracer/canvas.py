@@ -1,8 +1,8 @@
 """The pose of the camera: eye, canvas, rays through pixels (document, section 7), in double precision.
 
-The ray of a pixel starts on the canvas at P = K + x X + y Y, with x and y the offsets of the pixel from the canvas
-center in scene units, and its direction is that of dis f + x X + y Y: made of offsets, since P - e cancels all digits
-when the eye is close to the canvas.
+The ray of a pixel starts on the canvas at P = K + x X + y Y, with x and y the offsets of the pixel from the
+canvas center in scene units, and its direction is that of dis f + x X + y Y: made of offsets, since P - e
+cancels all digits when the eye is close to the canvas.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from tracer.ray import normalize
 
 @dataclass(frozen=True)
 class Canvas:
-    """Eye and canvas. `center` K, unit vectors `x` (right), `y` (down), `forward` f = (K - e)/dis; `distance` dis;
-    `width`, `height` in pixels; `pixel_size` s in scene units; `offset` delta of the ray in its pixel; `scale` S of
-    this picture against the one that the scene asks for."""
+    """Eye and canvas. `center` K, unit vectors `x` (right), `y` (down), `forward` f = (K - e)/dis; `distance`
+    dis; `width`, `height` in pixels; `pixel_size` s in scene units; `offset` delta of the ray in its pixel;
+    `scale` S of this picture against the one that the scene asks for."""
 
     center: np.ndarray
     x: np.ndarray
@@ -101,7 +101,8 @@ def _canvas_pose(camera: Camera) -> tuple[np.ndarray, np.ndarray, np.ndarray, np
 
 
 def _look_at_pose(camera: Camera) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
-    """f = unit(target - origin), X = unit(f x up), Y = f x X; the pixel size follows from the field of view."""
+    """f = unit(target - origin), X = unit(f x up), Y = f x X; the pixel size follows from the field of
+    view."""
     assert camera.origin is not None and camera.target is not None and camera.fov is not None
     origin = np.asarray(camera.origin, np.float64)
     forward = _unit(np.asarray(camera.target, np.float64) - origin)
@@ -120,8 +121,8 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 class DeviceCanvas:
     """A canvas in a kernel: width-1 numbers that kernels read from memory.
 
-    `center` K, `x`, `y`: steps of one pixel along X and Y, `forward`: dis f, `axis`: f, `half_width`, `half_height` in
-    pixels, `offset` delta.
+    `center` K, `x`, `y`: steps of one pixel along X and Y, `forward`: dis f, `axis`: f, `half_width`,
+    `half_height` in pixels, `offset` delta.
     """
 
     center: Any

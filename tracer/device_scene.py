@@ -1,7 +1,7 @@
 """Compiles a scene description into what a kernel may touch: flat tables, width-1 numbers, integer ids.
 
-Structure (how many shapes of which kind, which options are on) is Python and part of the kernel; numbers live in
-memory, so moving a sphere or changing a color compiles nothing new.
+Structure (how many shapes of which kind, which options are on) is Python and part of the kernel; numbers live
+in memory, so moving a sphere or changing a color compiles nothing new.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ class SmoothTables:
 class HostScene:
     """What the host knows of a compiled scene, in double precision.
 
-    `first_primitive` (shapes + 1,), `faces`: face numbers of each mesh by shape, `extent`: the largest |coordinate| of
-    the finite shapes, `meshes`: placed triangles by shape.
+    `first_primitive` (shapes + 1,), `faces`: face numbers of each mesh by shape, `extent`: the largest
+    |coordinate| of the finite shapes, `meshes`: placed triangles by shape.
     """
 
     first_primitive: np.ndarray
@@ -71,11 +71,12 @@ class HostScene:
 class DeviceScene:
     """A scene in Dr.Jit memory, for one backend and precision.
 
-    `slots`: planes and spheres that stand in the kernel one by one, in the order of the shapes; `sphere_table`: all
-    spheres when they are many; `triangles`: those of all meshes. Tables by shape, in packets of four: `geometry` (plane
-    n, d or sphere center, radius), `ids` (shape kind times 256 plus texture flags, first color, count of colors, plane
-    bit), `surfaces` (ior, k_r, k_t, k_a; m, h, s, texture rate), `object_space` (the 3x4 matrix back), `first_primitive` (one each). By primitive,
-    when there are meshes: `shape_of`, `triangle_of`.
+    `slots`: planes and spheres that stand in the kernel one by one, in the order of the shapes;
+    `sphere_table`: all spheres when they are many; `triangles`: those of all meshes. Tables by shape, in
+    packets of four: `geometry` (plane n, d or sphere center, radius), `ids` (shape kind times 256 plus
+    texture flags, first color, count of colors, plane bit), `surfaces` (ior, k_r, k_t, k_a; m, h, s, texture
+    rate), `object_space` (the 3x4 matrix back), `first_primitive` (one each). By primitive, when there are
+    meshes: `shape_of`, `triangle_of`.
     """
 
     backend: Backend
@@ -156,7 +157,8 @@ def compile_scene(scene: Scene, backend: Backend) -> DeviceScene:
 
 
 def stack_entries(cutoff: float, max_depth: int) -> int:
-    """Pending rays of one pixel at most: they weigh <= 1 together and >= cutoff each, and one waits a level."""
+    """Pending rays of one pixel at most: they weigh <= 1 together and >= cutoff each, and one waits a
+    level."""
     return max(1, min(int(1 / (cutoff - 1e-6)), max_depth))
 
 

@@ -16,7 +16,8 @@ from tracer.shapes.plane import PlaneSlot
 
 @dataclass
 class Finish:
-    """The local part of a material at n hits: factors `diffuse` m and `specular` h, exponent `shininess` s."""
+    """The local part of a material at n hits: factors `diffuse` m and `specular` h, exponent `shininess`
+    s."""
 
     diffuse: Any
     specular: Any
@@ -40,8 +41,9 @@ def direct_light(
     width = dr.width(active)
     total = dr.zeros(backend.Vector3, width)
     shadow_rays = dr.zeros(backend.UInt32, width)
-    if dr.hint(scene.lights.samples is not None, mode="scalar"):
-        for sample in scene.lights.samples:
+    few = scene.lights.samples
+    if dr.hint(few is not None, mode="scalar"):
+        for sample in few or []:
             terms = sample_terms(scene, ray, surface, finish, sample, active)
             total += terms.light
             shadow_rays += dr.select(terms.shadow_ray, backend.UInt32(1), 0)
@@ -50,9 +52,7 @@ def direct_light(
     while dr.hint(
         i < scene.lights.count, label="lights", exclude=[scene, backend, ray, surface, finish, pixel, sub_ray]
     ):
-        sample = fetch_light(
-            backend, scene.lights, i, pixel, sub_ray, lambda p: _sides_and_decided(scene, p)
-        )
+        sample = fetch_light(backend, scene.lights, i, pixel, sub_ray, lambda p: _sides_and_decided(scene, p))
         terms = sample_terms(scene, ray, surface, finish, sample, active)
         total += terms.light
         shadow_rays += dr.select(terms.shadow_ray, backend.UInt32(1), 0)
@@ -65,8 +65,8 @@ def sample_terms(
 ) -> SampleTerms:
     """What one point light adds to m D + h H, its shadow included.
 
-    l = (L - p)/|L - p|, r = 2(n.l)n - l, v = -d; both terms are 0 unless n.l > 0 (for a smooth mesh: by its geometric
-    normal too) and where the light lies on the shaded point.
+    l = (L - p)/|L - p|, r = 2(n.l)n - l, v = -d; both terms are 0 unless n.l > 0 (for a smooth mesh: by its
+    geometric normal too) and where the light lies on the shaded point.
     """
     backend = scene.backend
     to_light = sample.position - surface.p
@@ -82,7 +82,9 @@ def sample_terms(
     highlight = _power(mirrored, finish.shininess, matters)
     diffuse = cosine if scene.options.diffuse_is_lambert else mirrored
     local = dr.fma(finish.diffuse, diffuse, finish.specular * highlight)
-    segment = Segment(leave(ray, surface, l, crosses=False), length, sample.sides, sample.decided)
+    segment = Segment(
+        leave(ray, surface, l, crosses=False), length, sample.position, sample.sides, sample.decided
+    )
     if scene.options.transparent_shadows:
         local = local * transmittance(scene, segment, lit)
         visible = lit

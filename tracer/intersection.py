@@ -1,7 +1,7 @@
 """What a ray meets: the nearest hit, what hides a light, and the surface at a hit.
 
-The same three functions serve the camera, the ray queries, the accuracy suite and the viewer; none of them knows
-where its rays come from.
+The same three functions serve the camera, the ray queries, the accuracy suite and the viewer; none of them
+knows where its rays come from.
 """
 
 from __future__ import annotations
@@ -27,9 +27,10 @@ ANALYTIC_SURFACES = {PLANE: PlaneSlot.surface, SPHERE: SphereSlot.surface}
 class Surface:
     """The surface at n hits.
 
-    `p`: the hit point, moved onto the surface; `outward`: geometric unit normal; `normal`: shading normal that faces
-    the ray; `entering`: the ray comes from the side that `outward` points to; `lit_side`: geometric normal facing the
-    ray; `shape`, `primitive`: numbers; `ids`: the shape's row of `DeviceScene.ids`; `view`: see `Ray`.
+    `p`: the hit point, moved onto the surface; `outward`: geometric unit normal; `normal`: shading normal
+    that faces the ray; `entering`: the ray comes from the side that `outward` points to; `lit_side`:
+    geometric normal facing the ray; `shape`, `primitive`: numbers; `ids`: the shape's row of
+    `DeviceScene.ids`; `view`: see `Ray`.
     """
 
     p: Any
@@ -61,7 +62,8 @@ def plane_sides(scene: DeviceScene, o: Any, d: Any) -> Any:
 
 
 def closest_hit(scene: DeviceScene, ray: Ray, active: Any, t_max: Any = None) -> Hit:
-    """The smallest t > 0 (at most `t_max` when given); of equal ones the lower shape, then the lower primitive."""
+    """The smallest t > 0 (at most `t_max` when given); of equal ones the lower shape, then the lower
+    primitive."""
     hit = no_hit(scene.backend, dr.width(ray.d))
     if t_max is not None:
         hit.t = dr.select(active, t_max, hit.t)
@@ -99,8 +101,9 @@ def hidden(scene: DeviceScene, segment: Segment, active: Any) -> Any:
             departure(scene, segment.ray),
             state=blocked,
             limit=lambda blocked: dr.select(blocked, never, segment.length),
-            visit=lambda blocked, _t, _primitive, test, valid: blocked
-            | (valid & ~_holds_light(segment, test)),
+            visit=lambda blocked, _t, _primitive, test, valid: (
+                blocked | (valid & ~_holds_light(segment, test))
+            ),
             active=~blocked,
         )
     return blocked & active
@@ -117,8 +120,9 @@ def transmittance(scene: DeviceScene, segment: Segment, active: Any) -> Any:
         share = scene.sphere_table.fold(
             share,
             active,
-            lambda share, slot: share
-            * _power_0_1_2(_refraction_of(scene, slot.primitive), slot.crossings(segment, active)),
+            lambda share, slot: (
+                share * _power_0_1_2(_refraction_of(scene, slot.primitive), slot.crossings(segment, active))
+            ),
             lambda share: share > 0,
         )
     if scene.triangles is not None:
@@ -150,8 +154,8 @@ def _refraction_of(scene: DeviceScene, primitive: Any) -> Any:
 
 
 def _crossed(factor: Any, owned: Any) -> Any:
-    """The factor of a surface that is crossed; exactly on an edge only one of two neighbors counts, but an opaque
-    one always does."""
+    """The factor of a surface that is crossed; exactly on an edge only one of two neighbors counts, but an
+    opaque one always does."""
     return dr.select(owned | (factor == 0), factor, 1)
 
 
@@ -222,7 +226,8 @@ def _smooth_normal(
     entering: Any,
     active: Any,
 ) -> Any:
-    """The interpolated vertex normal on the lit side; the geometric one where it would face away from the ray."""
+    """The interpolated vertex normal on the lit side; the geometric one where it would face away from the
+    ray."""
     assert scene.smooth is not None and scene.triangles is not None
     backend = scene.backend
     wanted = dr.gather(backend.UInt32, scene.smooth.shapes, shape, active)
@@ -238,7 +243,8 @@ def _smooth_normal(
 
 
 def barycentrics(v0: Any, v1: Any, v2: Any, p: Any) -> tuple[Any, Any]:
-    """Weights of v1 and v2 at a point p of the triangle, by areas projected on the normal (document, section 5.9)."""
+    """Weights of v1 and v2 at a point p of the triangle, by areas projected on the normal (document, section
+    5.9)."""
     e1, e2, q = v1 - v0, v2 - v0, p - v0
     cross = dr.cross(e1, e2)
     area2 = dr.squared_norm(cross)
@@ -262,7 +268,8 @@ def departure(scene: DeviceScene, ray: Ray) -> Departure:
     outward = dr.select(
         is_mesh, triangle.normal, dr.select(kind == SPHERE, normalize(ray.o - center), center)
     )
-    # A smooth mesh may send a ray to the other side of its facet than its word says: there the direction decides.
+    # A smooth mesh may send a ray to the other side of its facet than its word says: there the direction
+    # decides.
     below = dr.select(is_mesh, dr.dot(outward, ray.d) < 0, ray.inside)
     normal = dr.select(below, -outward, outward)
     climb = dr.dot(normal, ray.d)

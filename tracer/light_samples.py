@@ -1,7 +1,8 @@
 """Area lights as sets of point lights (document, section 4): the samples' places, plain and jittered.
 
-Every sample is one row: position = base + alpha A + beta B, where the light's shape gives the vectors A and B and two
-numbers on the sample. Without jitter the position is computed once, in double precision; with jitter in the kernel.
+Every sample is one row: position = base + alpha A + beta B, where the light's shape gives the vectors A and B
+and two numbers on the sample. Without jitter the position is computed once, in double precision; with jitter
+in the kernel.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ UNROLLED_SAMPLES = 4
 """Up to so many samples stand in the kernel one by one; more are looped over."""
 
 ROW = 16
-"""Floats of a sample: base (3), A (3), first, B (3), second, color times share of the light (3), and 2 unused."""
+"""Floats of a sample: base (3), A (3), first, B (3), second, color times share of the light (3), and 2
+unused."""
 
 
 @dataclass
@@ -94,9 +96,9 @@ class LightSample:
 class LightTables:
     """All light samples in Dr.Jit memory.
 
-    `rows`: `ROW` floats a sample (without jitter `base` is the position); `kinds`, `lights`: its kind and the number of
-    its light; `sides`, `decided`: its bits for the planes; `count`: width-1; `jitter`: some light has it; `samples`: all of
-    them as width-1 numbers, when they are few and none jitters.
+    `rows`: `ROW` floats a sample (without jitter `base` is the position); `kinds`, `lights`: its kind and the
+    number of its light; `sides`, `decided`: its bits for the planes; `count`: width-1; `jitter`: some light
+    has it; `samples`: all of them as width-1 numbers, when they are few and none jitters.
     """
 
     rows: Any
@@ -115,7 +117,8 @@ def compile_lights(
 ) -> LightTables:
     """Tables of the samples of all lights whose weight is not zero.
 
-    `colors` (lights, 3): in the color space of the shading; `planes` (p, 4): n and d of the planes that have bits.
+    `colors` (lights, 3): in the color space of the shading; `planes` (p, 4): n and d of the planes that have
+    bits.
     """
     total = math.fsum(light.weight for light in lights)
     rows, kinds, numbers = [], [], []
@@ -209,7 +212,8 @@ def fetch_light(
 
 
 def _jitter(backend: Backend, tables: LightTables, i: Any, pixel: Any, sub_ray: Any) -> tuple[Any, Any]:
-    """The two shifts in [0, 1) of a light's pattern: the same for all its samples and all hits of a sub-ray."""
+    """The two shifts in [0, 1) of a light's pattern: the same for all its samples and all hits of a
+    sub-ray."""
     light = dr.gather(backend.UInt32, tables.lights, i)
     key = (tables.seed, backend.UInt32(JITTER_STREAM))
     words = philox(key, (pixel, sub_ray, light, backend.UInt32(0)))

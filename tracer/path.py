@@ -1,4 +1,5 @@
-"""The ray in hand: what the recursion must remember of a ray that is still to be traced (document, section 3)."""
+"""The ray in hand: what the recursion must remember of a ray that is still to be traced (document, section
+3)."""
 
 from __future__ import annotations
 
@@ -12,10 +13,12 @@ from tracer.ray import Ray
 
 @cache
 def path_type(backend: Backend, has_view: bool) -> Any:
-    """The record type of a path: made per backend, since Dr.Jit reads the field types of what it keeps on a stack.
+    """The record type of a path: made per backend, since Dr.Jit reads the field types of what it keeps on a
+    stack.
 
-    Fields: the ray (`o`, `d`, `departure`, `sides`, and `view` where the scene has meshes), `weight` (product of the k's
-    so far, for the cut-off), `throughput` (3, n; what its light is worth) and `level` (0 for a primary ray).
+    Fields: the ray (`o`, `d`, `departure`, `sides`, and `view` where the scene has meshes), `weight` (product
+    of the k's so far, for the cut-off), `throughput` (3, n; what its light is worth) and `level` (0 for a
+    primary ray).
     """
     fields = [
         ("o", backend.Vector3),

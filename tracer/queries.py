@@ -1,7 +1,7 @@
 """Plain ray queries: NumPy in, NumPy out (document, sections 3 to 5).
 
-`intersect` finds the nearest hit of any ray, `visible` whether two points see each other, `trace_path` follows a chain
-of mirror reflections and refractions.
+`intersect` finds the nearest hit of any ray, `visible` whether two points see each other, `trace_path`
+follows a chain of mirror reflections and refractions.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ END_GUARD = {"single": 1e-5, "double": 1e-9}
 class Hits:
     """The nearest hits of n rays.
 
-    `t` (n,) distance along the unit direction, inf on a miss; `shape`, `primitive`, `face` (n,) int64 numbers of the
-    shape, of the triangle in file order (0 for spheres and planes) and of the file's face, -1 on a miss; `normal`
-    (n, 3) outward geometric unit normal, `position` (n, 3), NaN on a miss; `valid` (n,) bool.
+    `t` (n,) distance along the unit direction, inf on a miss; `shape`, `primitive`, `face` (n,) int64 numbers
+    of the shape, of the triangle in file order (0 for spheres and planes) and of the file's face, -1 on a
+    miss; `normal` (n, 3) outward geometric unit normal, `position` (n, 3), NaN on a miss; `valid` (n,) bool.
     """
 
     t: np.ndarray
@@ -128,8 +128,8 @@ def trace_path(
 ) -> Paths:
     """One specular chain a ray: at every vertex the next of `events`, R for mirror, T for refraction.
 
-    Materials only give the index of refraction; their shares and the cut-off play no part. Total reflection under a T
-    ends the chain: its vertex counts, its direction is NaN.
+    Materials only give the index of refraction; their shares and the cut-off play no part. Total reflection
+    under a T ends the chain: its vertex counts, its direction is NaN.
     """
     types = find_backend(backend, precision)
     o, d = _rays(origins, directions)
@@ -215,7 +215,9 @@ def _rays(origins: ArrayLike, directions: ArrayLike) -> tuple[np.ndarray, np.nda
     try:
         o, d = (np.ascontiguousarray(a) for a in np.broadcast_arrays(o, d))
     except ValueError:
-        raise UsageError(f"origins and directions: {len(o)} and {len(d)} rows; allowed is one number") from None
+        raise UsageError(
+            f"origins and directions: {len(o)} and {len(d)} rows; allowed is one number"
+        ) from None
     return o, d
 
 

@@ -1,18 +1,19 @@
 """Rays, hits and segments: the records that travel between the camera, the shapes and the loop.
 
-Conventions: directions are unit length; a hit distance `t` is measured along the ray from its origin. Ids number the
-primitives of a scene: one for a plane or a sphere, one a triangle, in the order of the shapes and of the file.
+Conventions: directions are unit length; a hit distance `t` is measured along the ray from its origin. Ids
+number the primitives of a scene: one for a plane or a sphere, one a triangle, in the order of the shapes and
+of the file.
 
-Why there is no epsilon along the ray. A secondary ray starts on a surface, and rounding puts its origin a little to
-one side or the other. Instead of pushing it away, the ray carries what is known without rounding:
+Why there is no epsilon along the ray. A secondary ray starts on a surface, and rounding puts its origin a
+little to one side or the other. Instead of pushing it away, the ray carries what is known without rounding:
 
-* `departure`: the primitive it leaves and the side it travels on (`2 id + inside`, `INVALID` for a free ray). A plane
-  or a triangle cannot be hit again; on a sphere one root is known to be zero.
+* `departure`: the primitive it leaves and the side it travels on (`2 id + inside`, `INVALID` for a free ray).
+  A plane or a triangle cannot be hit again; on a sphere one root is known to be zero.
 * `sides`: one bit for each of the first 32 planes, set when the origin lies on the positive side. Nothing but
   crossing a plane changes its bit, so a ray can neither lose a plane that it starts next to nor hit it twice.
 
-* `view`: in scenes with meshes, the direction towards where the starting point was seen from. It tells on which side
-  of a triangle the point is when rounding cannot (`acceleration/departure.py`).
+* `view`: in scenes with meshes, the direction towards where the starting point was seen from. It tells on
+  which side of a triangle the point is when rounding cannot (`acceleration/departure.py`).
 
 Plain dataclasses with no defaults: frozen ones cannot be loop state, defaults would be shared.
 """
@@ -26,14 +27,14 @@ import drjit as dr
 
 from tracer.backends import INVALID, Backend
 
-
 SIDE_BITS = 32
 """Planes whose side a ray remembers."""
 
 
 @dataclass
 class Ray:
-    """n rays. `o`, `d`: (3, n), `departure`, `sides`: (n,) unsigned, `view`: (3, n), None in a scene without meshes."""
+    """n rays. `o`, `d`: (3, n), `departure`, `sides`: (n,) unsigned, `view`: (3, n), None in a scene without
+    meshes."""
 
     o: Any
     d: Any
@@ -77,14 +78,15 @@ def keep_nearer(hit: Hit, t: Any, valid: Any, primitive: Any) -> Hit:
 
 @dataclass
 class Segment:
-    """The straight way to a light: `ray` from the shaded point, `length` to the light.
+    """The straight way to a light: `ray` from the shaded point, `length` to the light at `light` (3, n).
 
-    `light_sides` and `light_decided`: the light's own bits for the first 32 planes, and which of them count (a light
-    that lies on a plane is not hidden by it).
+    `light_sides` and `light_decided`: the light's own bits for the first 32 planes, and which of them count
+    (a light that lies on a plane is not hidden by it).
     """
 
     ray: Ray
     length: Any
+    light: Any
     light_sides: Any
     light_decided: Any
 
@@ -103,7 +105,8 @@ def departure_word(primitive: Any, inside: Any) -> Any:
 
 
 def normalize(v: Any) -> Any:
-    """v / |v| by square root and division, each correctly rounded (`dr.normalize` uses an estimate on LLVM)."""
+    """v / |v| by square root and division, each correctly rounded (`dr.normalize` uses an estimate on
+    LLVM)."""
     return v * dr.rcp(dr.sqrt(dr.squared_norm(v)))
 
 

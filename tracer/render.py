@@ -4,31 +4,27 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any
 
 import drjit as dr
 import numpy as np
 
-from tracer.aovs import LAYERS, compute_layers
+from tracer.aovs import compute_layers
 from tracer.backends import Backend, exact_arithmetic, find_backend, thread_count
-from tracer.canvas import Canvas, DeviceCanvas
+from tracer.canvas import DeviceCanvas
 from tracer.color import encode_srgb
 from tracer.device_scene import DeviceScene, compile_scene
-from tracer.errors import UsageError
 from tracer.film.depth_of_field import blur_reach, depth_of_field
 from tracer.film.film import Film
 from tracer.film.result import Result
 from tracer.scene import Scene
+from tracer.settings import RAYS_PER_BAND, Settings, picture_canvas, picture_rectangle, with_seed
 from tracer.tiles import Band, Rectangle, bands, lane_pixels
 from tracer.version import __version__
 from tracer.whitted import Counts, PixelGrid, trace_pixels
-
-RAYS_PER_BAND = 1 << 21
-"""Primary rays of a launch: enough to fill a GPU, few enough for progress and an answer to Ctrl-C."""
 
 COUNTERS = tuple(f.name for f in fields(Counts))
 
@@ -44,63 +40,59 @@ class RenderInterrupted(KeyboardInterrupt):
         self.partial = partial
 
 
-@dataclass(frozen=True)
-class Settings:
-    """What a render asks for beyond the scene; see `render`."""
-
-    precision: str = "single"
-    backend: str = "auto"
-    supersample: int | None = None
-    aovs: tuple[str, ...] = ("depth",)
-    scale: float = 1.0
-    resolution: tuple[int, int] | None = None
-    crop: Rectangle | None = None
-    threads: int | None = None
-    seed: int | None = None
-    rays_per_band: int = RAYS_PER_BAND
-
-
-def render(scene: Scene, *, progress: Progress | None = None, **settings: Any) -> Result:
+def render(
+    scene: Scene,
+    precision: str = "single",
+    backend: str = "auto",
+    supersample: int | None = None,
+    aovs: Sequence[str] = ("depth",),
+    *,
+    scale: float = 1.0,
+    resolution: tuple[int, int] | None = None,
+    crop: Rectangle | None = None,
+    threads: int | None = None,
+    seed: int | None = None,
+    rays_per_band: int = RAYS_PER_BAND,
+    progress: Progress | None = None,
+) -> Result:
     """Renders a scene.
 
     Args:
         scene: from `tracer.load` or built in code.
-        precision: "single" (default) or "double".
-        backend: "auto", "llvm" or "cuda".
-        supersample: n >= 1 for n x n rays a pixel; None: as the scene says.
+        precision: "single" or "double".
+        backend: "auto" (CUDA where there is a GPU, else LLVM), "llvm" or "cuda".
+        supersample: n for n x n rays a pixel, 1 to 64; None: as the scene says.
         aovs: names of layers, or "all": depth, normal, Ng, position, shape, primitive, uv.
         scale: size of the picture against the scene's resolution; the framing stays.
         resolution: (width, height) in pixels instead; the vertical extent of the canvas stays.
         crop: (x0, y0, x1, y1) in pixels of the full picture, end exclusive.
-        threads: CPU threads (LLVM), None: all cores.
+        threads: CPU threads (LLVM); None: all cores.
         seed: of jitter and depth of field; None: as the scene says.
-        progress: called after every band with (finished pixels, all pixels, rays so far).
+        rays_per_band: primary rays of one launch; no picture depends on it.
+        progress: called after every launch with (finished pixels, all pixels, rays so far).
 
-    Returns: `color` (h, w, 3) float32 (float64 in double precision), display-referred and not clamped; `depth` (h, w),
-        distance from the canvas along the ray, -1 blank; `alpha`, `z`, `aovs`, `stats`.
+    Returns: `color` (h, w, 3) float32 (float64 in double precision), display-referred and not clamped;
+        `depth` (h, w), distance from the canvas along the ray, -1 blank; `alpha`, `z`, `aovs`, `stats`.
 
-    Raises: `UsageError`, `SceneError` for bad input, `MachineError` when the machine lacks the backend,
+    Raises: `UsageError` and `SceneError` for bad input, `MachineError` when the machine lacks the backend,
         `RenderInterrupted` on Ctrl-C.
     """
-    unknown = set(settings) - {f.name for f in fields(Settings)}
-    if unknown:
-        raise TypeError(f"render() got an unexpected keyword argument {sorted(unknown)[0]!r}")
-    wanted = _checked(Settings(**settings))
-    backend = find_backend(wanted.backend, wanted.precision)
-    with exact_arithmetic(), thread_count(wanted.threads):
-        return _Job(_with_seed(scene, wanted.seed), wanted, backend, progress).run()
+    settings = Settings(
+        precision, backend, supersample, aovs, scale, resolution, crop, threads, seed, rays_per_band
+    ).checked()
+    types = find_backend(settings.backend, settings.precision)
+    with exact_arithmetic(), thread_count(settings.threads):
+        return _Job(with_seed(scene, settings.seed), settings, types, progress).run()
 
 
 class _Job:
     """One render under way."""
 
-    def __init__(
-        self, scene: Scene, settings: Settings, backend: Backend, progress: Progress | None
-    ) -> None:
+    def __init__(self, scene: Scene, settings: Settings, backend: Backend, progress: Progress | None) -> None:
         started = time.perf_counter()
         self.scene, self.settings, self.backend, self.progress = scene, settings, backend, progress
-        self.canvas = _canvas(scene, settings)
-        self.rectangle = _rectangle(settings.crop, self.canvas)
+        self.canvas = picture_canvas(scene, settings)
+        self.rectangle = picture_rectangle(settings.crop, self.canvas)
         self.n = settings.supersample or scene.camera.supersample
         self.layers = [name for name in settings.aovs if name != "depth"]
         self.device: DeviceScene = compile_scene(scene, backend)
@@ -160,7 +152,8 @@ class _Job:
             film.counts[name] = merge(film.counts[name], int(total.numpy()[0]))
 
     def _filtered(self, film: Film) -> Film:
-        """The film after the depth-of-field filter; a crop's first pass is widened to what the filter reads."""
+        """The film after the depth-of-field filter; a crop's first pass is widened to what the filter
+        reads."""
         settings = self.scene.camera.depth_of_field
         if settings is None or settings.focus < 0:
             return film
@@ -212,60 +205,6 @@ class _Job:
             "backend": self.backend.name,
             "precision": self.backend.precision,
         }
-
-
-def _checked(settings: Settings) -> Settings:
-    """The settings with AOV names spelled out; raises `UsageError`."""
-    aovs = (settings.aovs,) if isinstance(settings.aovs, str) else tuple(settings.aovs)
-    known = ["depth", *LAYERS]
-    if "all" in aovs:
-        aovs = tuple(known)
-    for name in aovs:
-        if name not in known:
-            raise UsageError(f"aov: {name!r} is unknown; allowed are {', '.join(known)} and all")
-    if settings.supersample is not None and not 1 <= settings.supersample <= 64:
-        raise UsageError(f"supersample: {settings.supersample} is out of range; allowed is 1 to 64")
-    if not (math.isfinite(settings.scale) and settings.scale > 0):
-        raise UsageError(f"scale: {settings.scale} is out of range; allowed is a number above 0")
-    if settings.threads is not None and settings.threads < 1:
-        raise UsageError(f"threads: {settings.threads} is out of range; allowed is 1 or more")
-    if settings.resolution is not None and min(settings.resolution) < 1:
-        raise UsageError(f"resolution: {settings.resolution} is out of range; allowed is 1 or more")
-    return Settings(**(vars(settings) | {"aovs": aovs}))
-
-
-def _canvas(scene: Scene, settings: Settings) -> Canvas:
-    canvas = Canvas.of(scene.camera, scene.literal)
-    if settings.resolution is not None:
-        canvas = canvas.resized(*settings.resolution)
-    if settings.scale != 1:
-        canvas = canvas.scaled(settings.scale)
-    if canvas.width * canvas.height > 2**30:
-        raise UsageError(f"resolution: {canvas.width} x {canvas.height} pixels; allowed are 2^30 in all")
-    return canvas
-
-
-def _rectangle(crop: Rectangle | None, canvas: Canvas) -> Rectangle:
-    if crop is None:
-        return (0, 0, canvas.width, canvas.height)
-    x0, y0, x1, y1 = crop
-    if not (0 <= x0 < x1 <= canvas.width and 0 <= y0 < y1 <= canvas.height):
-        raise UsageError(
-            f"crop: {x0} {y0} {x1} {y1} is empty or leaves the picture; allowed is 0 <= X0 < X1 <= {canvas.width} "
-            f"and 0 <= Y0 < Y1 <= {canvas.height}"
-        )
-    return (x0, y0, x1, y1)
-
-
-def _with_seed(scene: Scene, seed: int | None) -> Scene:
-    """The scene with both its seeds replaced."""
-    if seed is None:
-        return scene
-    scene = scene.model_copy(deep=True)
-    scene.seed = seed
-    if scene.camera.depth_of_field is not None:
-        scene.camera.depth_of_field.seed = seed
-    return scene
 
 
 def scene_hash(scene: Scene) -> str:

@@ -17,8 +17,8 @@ from tracer.textures.tables import TextureRow
 
 @dataclass
 class MaterialRow:
-    """The material at n hits: `ior`, shares `reflection` k_r, `refraction` k_t, `absorption` k_a, its finish, and the
-    texture."""
+    """The material at n hits: `ior`, shares `reflection` k_r, `refraction` k_t, `absorption` k_a, its finish,
+    and the texture."""
 
     ior: Any
     reflection: Any
@@ -32,8 +32,8 @@ class MaterialRow:
 class Children:
     """The rays that follow a hit: paths `reflected`, `refracted`, and masks which of them are traced.
 
-    `total`: total internal reflection; where it is traced at all, its ray stands in `refracted`. `ended_by_cutoff`,
-    `ended_by_depth`: how many children were not traced, and why.
+    `total`: total internal reflection; where it is traced at all, its ray stands in `refracted`.
+    `ended_by_cutoff`, `ended_by_depth`: how many children were not traced, and why.
     """
 
     reflected: Any
@@ -76,7 +76,9 @@ def refract_direction(d: Any, n: Any, ior: Any, entering: Any) -> tuple[Any, Any
     return dr.select(ior == 1, d, bent), (k < 0) & (ior != 1)
 
 
-def spawn(scene: DeviceScene, path: Any, surface: Surface, material: MaterialRow, base: Any, active: Any) -> Children:
+def spawn(
+    scene: DeviceScene, path: Any, surface: Surface, material: MaterialRow, base: Any, active: Any
+) -> Children:
     """The children at a hit; `base` (3, n) is the throughput of the parent times own color times (1 - a)."""
     ray: Ray = path.ray
     mirror = mirror_direction(ray.d, surface.normal)

@@ -1,7 +1,7 @@
 """Which lane owns which pixel: 8x8 tiles in Morton order, row of tiles by row of tiles.
 
-Neighboring lanes then trace neighboring rays. A picture is launched in bands of whole tile rows; no band decides
-anything about a pixel, so every band height gives the same picture.
+Neighboring lanes then trace neighboring rays. A picture is launched in bands of whole tile rows; no band
+decides anything about a pixel, so every band height gives the same picture.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ class Band:
 
 
 def bands(rectangle: Rectangle, sub_rays: int, rays_per_band: int) -> Iterator[Band]:
-    """Cuts a rectangle into bands of whole tile rows with about so many primary rays each, one tile row at least."""
+    """Cuts a rectangle into bands of whole tile rows with about so many primary rays each, one tile row at
+    least."""
     x0, y0, x1, y1 = rectangle
     rays_per_tile_row = _tiles_across(x1 - x0) * _PIXELS * sub_rays
     height = max(1, rays_per_band // rays_per_tile_row) * TILE

@@ -1,8 +1,9 @@
 """Whitted's recursion as one loop (document, sections 2 and 3): every pixel's tree of rays, depth first.
 
-One lane owns one pixel. It traces a ray, adds the light of the surface, goes on with one child and keeps the other
-on a stack; when the stack is empty it takes the pixel's next sub-ray, so no lane waits for its neighbors. Because the
-pending rays of a pixel weigh at most 1 together and at least the cut-off each, the stack is short.
+One lane owns one pixel. It traces a ray, adds the light of the surface, goes on with one child and keeps the
+other on a stack; when the stack is empty it takes the pixel's next sub-ray, so no lane waits for its
+neighbors. Because the pending rays of a pixel weigh at most 1 together and at least the cut-off each, the
+stack is short.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ from tracer.textures.tables import texture_color
 
 @dataclass
 class PixelGrid:
-    """The pixels of a launch: `column`, `row` (n,) whole numbers, `number` (n,) row times width plus column of the full
-    picture, `n`: a pixel is the mean of n x n sub-rays (width 1), `active`: the lane owns a pixel."""
+    """The pixels of a launch: `column`, `row` (n,) whole numbers, `number` (n,) row times width plus column
+    of the full picture, `n`: a pixel is the mean of n x n sub-rays (width 1), `active`: the lane owns a
+    pixel."""
 
     column: Any
     row: Any
@@ -36,9 +38,9 @@ class PixelGrid:
 
 @dataclass
 class PixelColumns:
-    """What the loop finds for n pixels: mean `color` (3, n), `coverage` (share of sub-rays that hit), and of the
-    nearest sub-ray `depth` (-1: none), `view_depth` (how far the hit is from the canvas along the view axis, infinite:
-    none), `primitive` and `sub_ray`; `counts`: rays by kind."""
+    """What the loop finds for n pixels: mean `color` (3, n), `coverage` (share of sub-rays that hit), and of
+    the nearest sub-ray `depth` (-1: none), `view_depth` (how far the hit is from the canvas along the view
+    axis, infinite: none), `primitive` and `sub_ray`; `counts`: rays by kind."""
 
     color: Any
     coverage: Any
@@ -173,12 +175,12 @@ def _primary(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, sub_ra
     )
 
 
-def primary_ray(
-    backend: Backend, canvas: DeviceCanvas, pixels: PixelGrid, sub_ray: Any
-) -> tuple[Any, Any]:
+def primary_ray(backend: Backend, canvas: DeviceCanvas, pixels: PixelGrid, sub_ray: Any) -> tuple[Any, Any]:
     """Origin and direction of a sub-ray (document, section 7)."""
     n, number = backend.Float(pixels.n), backend.Float(sub_ray)
-    b = dr.floor((number + 0.5) / n)  # exact: at most 64 x 64 sub-rays; a whole division costs 20 times as much
+    b = dr.floor(
+        (number + 0.5) / n
+    )  # exact: at most 64 x 64 sub-rays; a whole division costs 20 times as much
     a = number - b * n
     column = backend.Float(pixels.column) + (a + canvas.offset) / n
     row = backend.Float(pixels.row) + (b + canvas.offset) / n
@@ -190,8 +192,6 @@ def texture_point(scene: DeviceScene, surface: Surface, active: Any) -> Any:
     if scene.object_space is None:
         return surface.p
     backend = scene.backend
-    rows = [
-        dr.gather(backend.Vector4, scene.object_space, surface.shape * 3 + k, active) for k in range(3)
-    ]
+    rows = [dr.gather(backend.Vector4, scene.object_space, surface.shape * 3 + k, active) for k in range(3)]
     p = surface.p
     return backend.Vector3(*(dr.fma(r.x, p.x, dr.fma(r.y, p.y, dr.fma(r.z, p.z, r.w))) for r in rows))

@@ -1,10 +1,16 @@
-"""What a secondary ray must meet, reasoned in double precision: convex solids in contact, with a band of doubt.
+"""What a secondary ray must meet, reasoned in double precision: convex solids in contact, with a band of
+doubt.
 
-A ray comes from open space and hits solid f at p, so p lies outside every other solid, however it was rounded. A
-ray that leaves f outwards can never meet f again; one that goes through f is inside of it until the line leaves f.
-Another solid g is met where the line enters it in front of p. The line certainly meets g when it meets g shrunk by
-the bound on rounding, and certainly misses g when it misses g grown by it. Where p itself lies within the bound of
-g, the grown g holds p; then g is missed when the line leaves the grown g at once. All other cases are doubtful and
+A ray comes from open space and hits solid f at p, so p lies outside every other solid, however it was
+rounded. A
+ray that leaves f outwards can never meet f again; one that goes through f is inside of it until the line
+leaves f.
+Another solid g is met where the line enters it in front of p. The line certainly meets g when it meets g
+shrunk by
+the bound on rounding, and certainly misses g when it misses g grown by it. Where p itself lies within the
+bound of
+g, the grown g holds p; then g is missed when the line leaves the grown g at once. All other cases are
+doubtful and
 are left out; tests bound how many they may be.
 """
 
@@ -18,7 +24,8 @@ import numpy as np
 
 Array = np.ndarray
 STEEP = 4.0
-"""A ray in contact with g surely leaves it when n.d > STEEP sqrt(bound / size): it then does not dip into it."""
+"""A ray in contact with g surely leaves it when n.d > STEEP sqrt(bound / size): it then does not dip into
+it."""
 
 
 class Solid(Protocol):
@@ -109,7 +116,11 @@ def first_contact(
         if isinstance(g, Polytope) and len(g.normals) > 1:
             certain &= own | ~in_contact | (g.faces_close(p, 4 * bound) <= 1)
         if crosses:
-            meets, misses, t = np.where(own, s1 > 0, meets), np.where(own, e1 <= 0, misses), np.where(own, t1, t)
+            meets, misses, t = (
+                np.where(own, s1 > 0, meets),
+                np.where(own, e1 <= 0, misses),
+                np.where(own, t1, t),
+            )
         else:
             meets, misses = meets & ~own, misses | own
         certain &= meets | misses

@@ -19,7 +19,8 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Bounce:
-    """First hits: `shape`, `primitive` (within the shape; -1: none), `p`, `outward`, `entering`; and what the rays
+    """First hits: `shape`, `primitive` (within the shape; -1: none), `p`, `outward`, `entering`; and what
+    the rays
     that leave meet: `next_shape`, `next_primitive`, `t`; `blocked`: a light at `length` is hidden."""
 
     valid: Array
@@ -60,7 +61,9 @@ def bounce(device: DeviceScene, o: Array, d_in: Array, d_out: Array, crosses: bo
         second = closest_hit(device, onward, valid)
         met = surface_at(device, onward, second, valid)
         none = dr.zeros(device.backend.UInt32, len(o))
-        segment = Segment(onward, dr.full(device.backend.Float, length, len(o)), none, none)
+        segment = Segment(
+            onward, dr.full(device.backend.Float, length, len(o)), onward.o + length * onward.d, none, none
+        )
         blocked = hidden(device, segment, valid)
         dr.eval(second, met, blocked)
     first = device.host.first_primitive

@@ -1,4 +1,5 @@
-"""What must hold exactly, or to a derived bound: glass of index 1, white in white light, a scene far from the origin."""
+"""What must hold exactly, or to a derived bound: glass of index 1, white in white light, a scene far from
+the origin."""
 
 from __future__ import annotations
 
@@ -46,7 +47,13 @@ def test_white_never_exceeds_one(precision: str, seed: int) -> None:
     """Everything white with m + h <= 1 under white lights: no color above 1 by more than 4 ulp."""
     rng = np.random.default_rng(seed)
     share, m = rng.uniform(0, 1), rng.uniform(0, 1)
-    white = {"ior": 1.3, "reflection": share * 0.6, "refraction": (1 - share) * 0.4, "diffuse": m, "specular": 1 - m}
+    white = {
+        "ior": 1.3,
+        "reflection": share * 0.6,
+        "refraction": (1 - share) * 0.4,
+        "diffuse": m,
+        "specular": 1 - m,
+    }
     table = worlds.room(ambient=float(rng.uniform(0, 1)), background=[1, 1, 1], secondary_background=True)
     table["lights"] = [
         {"kind": "point", "position": rng.uniform(-3, 9, 3).tolist(), "weight": float(rng.uniform(0.1, 3))}
@@ -84,7 +91,8 @@ def solid_room(shift: float) -> dict[str, Any]:
 def test_moved_scene_keeps_its_colors() -> None:
     """Moved by 2,000 units: the picture changes by less than the bound, except at edges, which are counted.
 
-    Every coordinate is rounded to eps (S + 2000), so normals, directions to lights and cosines change by that over
+    Every coordinate is rounded to eps (S + 2000), so normals, directions to lights and cosines change by
+    that over
     the smallest length in play, here the radius 1.5; see the table of tolerances.
     """
     here = tracer.render(tracer.load(solid_room(0.0)), precision="single")

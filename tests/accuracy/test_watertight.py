@@ -44,12 +44,17 @@ def aimed(name: str, target: str, seed: int) -> tuple[Array, Array, Array, Array
     """Mesh and rays (o, d) at points of edges, or at corners, all of whose faces front the ray."""
     rng = np.random.default_rng(seed)
     vertices, faces = closed_mesh(name, rng)
-    normals = unit(np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]]))
+    normals = unit(
+        np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
+    )
     edges, owners = edges_of(faces)
     k = rng.integers(len(edges), size=2 * RAYS)
     share = rng.uniform(size=(2 * RAYS, 1)) if target == "edge" else np.zeros((2 * RAYS, 1))
     point = (1 - share) * vertices[edges[k, 0]] + share * vertices[edges[k, 1]]
-    d = unit(-unit(normals[owners[k]].sum(axis=1)) + 0.9 * rng.uniform(0, 1, (2 * RAYS, 1)) * directions(rng, 2 * RAYS))
+    d = unit(
+        -unit(normals[owners[k]].sum(axis=1))
+        + 0.9 * rng.uniform(0, 1, (2 * RAYS, 1)) * directions(rng, 2 * RAYS)
+    )
     size = np.abs(vertices - vertices.mean(0)).max()
     cosine = -np.einsum("nij,nj->ni", normals[owners[k]], d)
     if target == "corner":
@@ -68,7 +73,9 @@ def aimed(name: str, target: str, seed: int) -> tuple[Array, Array, Array, Array
 def test_no_ray_passes_between_triangles(name: str, target: str, precision: str) -> None:
     """A miss, or a hit on the far side of the mesh, is a leak. The distance tells them apart."""
     vertices, faces, o, way = aimed(name, target, seed=len(name))
-    scene = tracer.load({"shapes": [{"kind": "mesh", "vertices": vertices.tolist(), "faces": faces.tolist()}]})
+    scene = tracer.load(
+        {"shapes": [{"kind": "mesh", "vertices": vertices.tolist(), "faces": faces.tolist()}]}
+    )
     hits = tracer.intersect(scene, o, way, precision=precision)
     assert len(o) > 0.5 * RAYS
     length = np.linalg.norm(way, axis=1)
@@ -77,4 +84,7 @@ def test_no_ray_passes_between_triangles(name: str, target: str, precision: str)
     leaks = passed & ~blocked_before
     if leaks.any():
         k = int(np.argmax(leaks))
-        pytest.fail(f"{int(leaks.sum())} of {len(o)}: from {o[k]} along {way[k]}: t = {hits.t[k]}, aimed at {length[k]}")
+        pytest.fail(
+            f"{int(leaks.sum())} of {len(o)}: from {o[k]} along {way[k]}: t = {hits.t[k]}, aimed at "
+            f"{length[k]}"
+        )

@@ -1,6 +1,7 @@
 """Two quads A and B that share an edge at any angle, and what is true of rays that start on one of them.
 
-In the plane across the edge a ray that leaves A at distance x from the edge, at the angle phi from A's own direction,
+In the plane across the edge a ray that leaves A at distance x from the edge, at the angle phi from A's own
+direction,
 meets B, which stands at the angle w on that side, exactly when w < pi and phi > w: whatever x is, even 0.
 """
 
@@ -20,7 +21,8 @@ EDGE = np.array([0.0, 1.0, 0.0])
 
 @dataclass(frozen=True)
 class Wedge:
-    """`theta`: angle from A to B; `frame`: rotation, `center`: middle of the shared edge, which is 2 `size` long."""
+    """`theta`: angle from A to B; `frame`: rotation, `center`: middle of the shared edge, which is 2 `size`
+    long."""
 
     theta: float
     frame: Array
@@ -63,7 +65,8 @@ class Tally:
 def try_wedge(degrees: float, trials: int, rays: int, offset: float, precision: str = "single") -> Tally:
     """Rays from both faces, both sides and through, 1e-7 to 1e-1 of the size from the edge.
 
-    The truth is that of the wedge before its vertices were rounded to single precision, so distances agree to single
+    The truth is that of the wedge before its vertices were rounded to single precision, so distances agree
+    to single
     precision whatever that of the rays is.
     """
     tally = Tally()
@@ -111,7 +114,7 @@ def _bounce_off(
         t = x * np.sin(opening) / np.sin(phi - opening) / np.sqrt(1 - y**2)
         reach = np.maximum(x * np.sin(phi) / np.sin(phi - opening) / 2, np.abs(p[:, 1] + y * t)) / size
     meets = (phi > opening) & (opening < np.pi)
-    used &= ~meets | (np.abs(reach - 1) > 1e-3)
+    used &= ~meets | (np.abs(reach - 1) > 2 * doubt)
     cosine = np.abs(np.sin(phi - opening)) * np.sqrt(1 - y**2)
     unit = bound("contact distance", "single", extent) / TOLERANCES["contact distance"].value
     _count(tally, found, used, meets & (reach < 1), np.where(meets, t, 0), cosine / unit, face)
@@ -119,7 +122,9 @@ def _bounce_off(
         tally.example = f"face {face}, crosses {crosses}, size {size}, " + tally.example
 
 
-def _count(tally: Tally, found: Bounce, used: Array, meets: Array, t: Array, per_unit: Array, face: int) -> None:
+def _count(
+    tally: Tally, found: Bounce, used: Array, meets: Array, t: Array, per_unit: Array, face: int
+) -> None:
     """`per_unit`: turns a difference of t into multiples of eps S."""
     hit = found.next_valid
     other = hit & (found.next_primitive // 2 == 1 - face)
@@ -135,7 +140,8 @@ def _count(tally: Tally, found: Bounce, used: Array, meets: Array, t: Array, per
     if wrong.any() and not tally.example:
         k = int(np.argmax(wrong))
         tally.example = (
-            f"from {found.p[k].tolist()} on triangle {found.primitive[k]}: met triangle {found.next_primitive[k]} at "
+            f"from {found.p[k].tolist()} on triangle {found.primitive[k]}: met triangle "
+            f"{found.next_primitive[k]} at "
             f"{found.t[k]}, truth {t[k] if meets[k] else 'nothing'}"
         )
 

@@ -1,6 +1,7 @@
 """Small seeded scenes for the comparison of `tracer` with `reference.plain`: one a feature, and random ones.
 
-Every scene is a dict as in a scene file. Coordinates are odd numbers on purpose: pixel centers must not fall on
+Every scene is a dict as in a scene file. Coordinates are odd numbers on purpose: pixel centers must not
+fall on
 edges by symmetry, where either answer is right. Files stand in one folder, made by `write_files`.
 """
 
@@ -100,8 +101,19 @@ def room(**changes: Any) -> Table:
             {"kind": "plane", "coefficients": [0, 0, 2, 10.6], "texture": "bands"},
             {"kind": "sphere", "center": [-2.31, 1.5, -1.7], "radius": 1.5, "material": "mirror"},
             {"kind": "sphere", "center": [0.71, 1.1, 1.2], "radius": 1.1, "material": "glass"},
-            {"kind": "sphere", "center": [2.9, 0.8, 0.1], "radius": 0.8, "color": "#d9362b", "material": "flat"},
-            cube(translate=[3.7, 1.33, -2.9], rotate=[12.0, 33.0, 5.0], scale=[1.1, 0.9, 1.3], material="glossy"),
+            {
+                "kind": "sphere",
+                "center": [2.9, 0.8, 0.1],
+                "radius": 0.8,
+                "color": "#d9362b",
+                "material": "flat",
+            },
+            cube(
+                translate=[3.7, 1.33, -2.9],
+                rotate=[12.0, 33.0, 5.0],
+                scale=[1.1, 0.9, 1.3],
+                material="glossy",
+            ),
         ],
     }
     return table | changes
@@ -200,26 +212,59 @@ def _many_spheres() -> Table:
 def _placed() -> Table:
     return room(
         shapes=[
-            {"kind": "plane", "coefficients": [0, 1, 0, 0.5], "rotate": [3.0, 0.0, 2.0], "translate": [0, 0.5, 0],
-             "scale": 2.0, "texture": "tiles", "texture_space": "object"},
+            {
+                "kind": "plane",
+                "coefficients": [0, 1, 0, 0.5],
+                "rotate": [3.0, 0.0, 2.0],
+                "translate": [0, 0.5, 0],
+                "scale": 2.0,
+                "texture": "tiles",
+                "texture_space": "object",
+            },
             {"kind": "plane", "point": [0, 0, -5.3], "u": [2, 0, 0.3], "v": [0, 3, 0.2], "texture": "bands"},
-            {"kind": "sphere", "center": [1, 0.5, 0.2], "radius": 0.7, "scale": 1.9, "rotate": [20.0, 40.0, -15.0],
-             "translate": [-0.7, 0.9, 0.3], "texture": "tiles", "texture_space": "object", "material": "glossy"},
-            cube(translate=[-3.1, 1.4, 0.2], rotate=[15.0, 25.0, 35.0], scale=[1.1, 0.9, 1.2], texture="bands",
-                 texture_space="object", material="glass", name="block"),
+            {
+                "kind": "sphere",
+                "center": [1, 0.5, 0.2],
+                "radius": 0.7,
+                "scale": 1.9,
+                "rotate": [20.0, 40.0, -15.0],
+                "translate": [-0.7, 0.9, 0.3],
+                "texture": "tiles",
+                "texture_space": "object",
+                "material": "glossy",
+            },
+            cube(
+                translate=[-3.1, 1.4, 0.2],
+                rotate=[15.0, 25.0, 35.0],
+                scale=[1.1, 0.9, 1.2],
+                texture="bands",
+                texture_space="object",
+                material="glass",
+                name="block",
+            ),
             {"kind": "instance", "of": "block", "translate": [3.3, 1.5, -0.9], "rotate": [5.0, -25.0, 10.0]},
         ]
-    )  # fmt: skip
+    )
 
 
 FEATURES: dict[str, Callable[[], Table]] = {
     "room": room,
     "no lights": lambda: room(lights=[]),
-    "weight zero": lambda: room(lights=[*POINT_LIGHTS, {"kind": "point", "position": [0, 3, 3], "weight": 0.0}]),
-    **{f"{kind} light": (lambda kind=kind: _area(kind, False)) for kind in ("ring", "disk", "sphere", "rectangle")},
-    **{f"{kind} jitter": (lambda kind=kind: _area(kind, True)) for kind in ("ring", "disk", "sphere", "rectangle")},
+    "weight zero": lambda: room(
+        lights=[*POINT_LIGHTS, {"kind": "point", "position": [0, 3, 3], "weight": 0.0}]
+    ),
+    **{
+        f"{kind} light": (lambda kind=kind: _area(kind, False))
+        for kind in ("ring", "disk", "sphere", "rectangle")
+    },
+    **{
+        f"{kind} jitter": (lambda kind=kind: _area(kind, True))
+        for kind in ("ring", "disk", "sphere", "rectangle")
+    },
     "light above": lambda: room(
-        lights=[{"kind": "disk", "center": [0.3, 8.1, 1.9], "normal": [0, -1, 0], "radius": 1.1, "samples": 5}]
+        lights=[
+            {"kind": "disk", "center": [0.3, 8.1, 1.9], "normal": [0, -1, 0], "radius": 1.1, "samples": 5}
+        ]
     ),
     "glasses": _glasses,
     "transparent shadows": lambda: _glasses(transparent_shadows=True),
@@ -258,9 +303,11 @@ FEATURES: dict[str, Callable[[], Table]] = {
     "three by three": lambda: _camera(supersample=3),
     "look at": _look_at,
     "turned": lambda: _camera(rotate=[-31.0, 17.0], position=[2.1, 3.3, 5.9]),
-    "depth of field": lambda: _camera(depth_of_field={"focus": 17.0, "depth_range": 3.0, "samples": 9, "seed": 4}),
+    "depth of field": lambda: _camera(
+        depth_of_field={"focus": 17.0, "depth_range": 3.0, "samples": 9, "seed": 4}
+    ),
     "depth of field, near": lambda: _camera(depth_of_field={"focus": 4.0, "samples": 30}),
-}  # fmt: skip
+}
 
 
 def random_scene(seed: int) -> Table:
@@ -278,8 +325,12 @@ def random_scene(seed: int) -> Table:
         {"kind": "plane", "coefficients": [*numbers(-0.1, 0.1, 1), 1.0, *numbers(-0.1, 0.1, 1), 1.7]},
         {"kind": "plane", "coefficients": [*numbers(-0.2, 0.2, 2), 1.0, 6.9]},
     ]
-    shapes += [{"kind": "sphere", "center": numbers(-3, 3), "radius": numbers(0.4, 1.4, 1)[0]} for _ in range(4)]
-    shapes += [cube(translate=numbers(-3, 3), rotate=numbers(0, 360), scale=numbers(0.4, 1.2)) for _ in range(2)]
+    shapes += [
+        {"kind": "sphere", "center": numbers(-3, 3), "radius": numbers(0.4, 1.4, 1)[0]} for _ in range(4)
+    ]
+    shapes += [
+        cube(translate=numbers(-3, 3), rotate=numbers(0, 360), scale=numbers(0.4, 1.2)) for _ in range(2)
+    ]
     for shape in shapes:
         shape["material"] = pick(*names)
         if rng.random() < 0.5:
@@ -299,7 +350,13 @@ def random_scene(seed: int) -> Table:
         seed=int(rng.integers(1 << 40)),
     )
     table["textures"] = table["textures"] | {"picture": _picture(filter=pick("nearest", "bilinear"))}
-    area = {"kind": "sphere", "center": numbers(-5, 5), "radius": 0.6, "samples": 5, "jitter": pick(True, False)}
+    area = {
+        "kind": "sphere",
+        "center": numbers(-5, 5),
+        "radius": 0.6,
+        "samples": 5,
+        "jitter": pick(True, False),
+    }
     table["lights"] = [{"kind": "point", "position": numbers(-8, 8), "weight": 2.0}, area]
     table["camera"] = table["camera"] | {"position": [0.13, 0.7, 7.1], "rotate": numbers(-9, 9, 2)}
     return table

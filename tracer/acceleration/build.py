@@ -1,8 +1,8 @@
 """Builds the bounding volume hierarchy: triangles sorted along a Morton curve under a complete binary tree.
 
-The tree needs no links. Node 1 is the root (the bounding box of the document's section 5.9), the children of node i
-are 2i and 2i+1, and the last `leaf_count` nodes are the leaves, two triangle slots each. Lauterbach et al., Fast BVH
-Construction on GPUs, 2009, for the order; everything here is vectorized NumPy.
+The tree needs no links. Node 1 is the root (the bounding box of the document's section 5.9), the children of
+node i are 2i and 2i+1, and the last `leaf_count` nodes are the leaves, two triangle slots each. Lauterbach et
+al., Fast BVH Construction on GPUs, 2009, for the order; everything here is vectorized NumPy.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ LEAF_SLOTS = 2
 
 @dataclass(frozen=True)
 class Hierarchy:
-    """`boxes` (2 leaf_count, 6): lower and upper corner of each node (row 0 unused); `order` (slots,): triangles."""
+    """`boxes` (2 leaf_count, 6): lower and upper corner of each node (row 0 unused); `order` (slots,):
+    triangles."""
 
     boxes: np.ndarray
     order: np.ndarray

@@ -1,14 +1,14 @@
 """Hits close to the start of a secondary ray: coplanar neighbors, convex edges and creases of a mesh.
 
-A ray that leaves surface A next to triangle B starts within rounding of B's plane: the sign of its distance from that
-plane is noise. What decides then is geometry that is large compared with rounding:
+A ray that leaves surface A next to triangle B starts within rounding of B's plane: the sign of its distance
+from that plane is noise. What decides then is geometry that is large compared with rounding:
 
-* B can only be hit if it rises above the plane through the origin along A, on the side the ray travels on. A coplanar
-  half of a quad and the other face of a convex edge do not.
-* If B rises (a crease), the origin is on that side of B on which A lies. If A reaches to both sides (a floor under a
-  wall), it is on the side from which it was seen: the ray that arrived there has not crossed B.
-* The ray meets B when it travels from that side towards it, at its distance from B's plane, or at 0 when rounding gave
-  the distance the wrong sign.
+* B can only be hit if it rises above the plane through the origin along A, on the side the ray travels on. A
+  coplanar half of a quad and the other face of a convex edge do not.
+* If B rises (a crease), the origin is on that side of B on which A lies. If A reaches to both sides (a floor
+  under a wall), it is on the side from which it was seen: the ray that arrived there has not crossed B.
+* The ray meets B when it travels from that side towards it, at its distance from B's plane, or at 0 when
+  rounding gave the distance the wrong sign.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from tracer.ray import Ray, max_abs, select_max
 class Departure:
     """What a ray knows of the surface that it leaves.
 
-    `active`: it does leave one; `primitive`: its id; `normal`: unit normal on the side of travel; `corners`, `reach`:
-    the surface lies within `reach` of the three points (a triangle: its corners and 0; a sphere: center and radius; a
-    plane: infinite); `view`: direction towards where the origin was seen from; `climb`: rate at which the ray rises
-    above the tangent plane.
+    `active`: it does leave one; `primitive`: its id; `normal`: unit normal on the side of travel; `corners`,
+    `reach`: the surface lies within `reach` of the three points (a triangle: its corners and 0; a sphere:
+    center and radius; a plane: infinite); `view`: direction towards where the origin was seen from; `climb`:
+    rate at which the ray rises above the tangent plane.
     """
 
     active: Any
@@ -44,8 +44,8 @@ class Departure:
 
 
 def doubtful(departure: Departure, test: TriangleTest) -> Any:
-    """Mask: rounding could decide this test. Either the plane passes through the origin, or the hit lies in the
-    tangent plane of the surface that the ray leaves."""
+    """Mask: rounding could decide this test. Either the plane passes through the origin, or the hit lies in
+    the tangent plane of the surface that the ray leaves."""
     through_origin = dr.abs(test.height) <= test.slack
     in_tangent_plane = test.touched & (test.t * departure.climb <= test.slack)
     return departure.active & (through_origin | in_tangent_plane)
@@ -64,7 +64,8 @@ def meet_near_origin(
 
 
 def _side(departure: Departure, triangle: Triangle, test: TriangleTest) -> Any:
-    """Positive where the surface that is left lies on the positive side of the triangle's plane, or is seen from it."""
+    """Positive where the surface that is left lies on the positive side of the triangle's plane, or is seen
+    from it."""
     offsets = [corner - triangle.v0 for corner in departure.corners]
     heights = [dr.dot(triangle.normal, offset) for offset in offsets]
     low = -_largest(-height for height in heights) - departure.reach

@@ -1,7 +1,7 @@
 """Visits the triangles whose boxes a ray crosses: without a stack, since the tree is complete.
 
-After node i comes its left child 2i if the box was hit, else the next subtree: i + 1 with its trailing zeros stripped
-(the right sibling of the lowest ancestor that is a left child); back at 1 the walk is over.
+After node i comes its left child 2i if the box was hit, else the next subtree: i + 1 with its trailing zeros
+stripped (the right sibling of the lowest ancestor that is a left child); back at 1 the walk is over.
 """
 
 from __future__ import annotations
@@ -14,20 +14,27 @@ import drjit as dr
 
 from tracer.acceleration.build import LEAF_SLOTS
 from tracer.acceleration.departure import Departure, doubtful, meet_near_origin
-from tracer.acceleration.triangle import TriangleTest, gather_triangle, meet_triangle, projection_axes
+from tracer.acceleration.triangle import (
+    Triangle,
+    TriangleTest,
+    gather_triangle,
+    meet_triangle,
+    projection_axes,
+)
 from tracer.backends import INVALID, Backend
-from tracer.ray import Hit, Ray, max_abs, select_max, select_min
+from tracer.ray import Ray, max_abs, select_max, select_min
 
 SMALLEST_COMPONENT = 1e-20
-"""Direction components below this count as this: their reciprocal stays finite, the ray moves by 1e-20 of its way."""
+"""Direction components below this count as this: their reciprocal stays finite, the ray moves by 1e-20 of its
+way."""
 
 
 @dataclass
 class TriangleTables:
     """All triangles of a scene and the tree over them, in Dr.Jit memory.
 
-    `triangles`: `TRIANGLE_WORDS` floats each, in file order; `boxes`: 8 floats a node; `order`: triangle of each leaf
-    slot; `primitive`: id of each triangle; `leaf_count`, `extent` (largest |coordinate|): width-1.
+    `triangles`: `TRIANGLE_WORDS` floats each, in file order; `boxes`: 8 floats a node; `order`: triangle of
+    each leaf slot; `primitive`: id of each triangle; `leaf_count`, `extent` (largest |coordinate|): width-1.
     """
 
     triangles: Any
@@ -52,7 +59,8 @@ def visit_triangles(
     visit: Visit,
     active: Any,
 ) -> Any:
-    """Calls `visit` for every triangle met, until the walk ends or `limit(state)` (a distance) falls below zero."""
+    """Calls `visit` for every triangle met, until the walk ends or `limit(state)` (a distance) falls below
+    zero."""
     slabs = _Slabs.of(backend, tables, ray)
     axes = projection_axes(ray.d)
 
@@ -66,14 +74,7 @@ def visit_triangles(
             primitive = dr.gather(backend.UInt32, tables.primitive, index)
             test = meet_triangle(backend.epsilon, triangle, ray, axes)
             other = ~(departure.active & (departure.primitive == primitive))
-            t, valid = dr.if_stmt(
-                args=(test.t, test.within & (test.t > 0)),
-                cond=other & doubtful(departure, test),
-                true_fn=lambda t, valid, x=(triangle, test): meet_near_origin(departure, ray, *x),
-                false_fn=lambda t, valid: (t, valid),
-                rv_labels=("t", "valid"),
-                label="near the origin",
-            )
+            t, valid = _decide(departure, ray, triangle, test, other & doubtful(departure, test))
             state = visit(state, t, primitive, test, valid & other & fresh & (t <= limit(state)))
         return state
 
@@ -100,12 +101,34 @@ def visit_triangles(
     return state
 
 
+def _decide(
+    departure: Departure, ray: Ray, triangle: Triangle, test: TriangleTest, doubts: Any
+) -> tuple[Any, Any]:
+    """Distance and mask of a hit; a branch for the few that rounding could decide wrongly."""
+
+    def doubtful_hit(t: Any, valid: Any) -> tuple[Any, Any]:
+        return meet_near_origin(departure, ray, triangle, test)
+
+    def clear_hit(t: Any, valid: Any) -> tuple[Any, Any]:
+        return t, valid
+
+    t, valid = dr.if_stmt(
+        args=(test.t, test.within & (test.t > 0)),
+        cond=doubts,
+        true_fn=doubtful_hit,
+        false_fn=clear_hit,
+        rv_labels=("t", "valid"),
+        label="near the origin",
+    )
+    return t, valid
+
+
 @dataclass
 class _Slabs:
     """A ray prepared for box tests: reciprocal direction, and its origin moved by the bound on all rounding.
 
-    The triangle test may accept a line that misses the exact triangle by the rounding of the corners seen from the
-    origin; so every box is widened by 8 eps times the largest coordinate in play.
+    The triangle test may accept a line that misses the exact triangle by the rounding of the corners seen
+    from the origin; so every box is widened by 8 eps times the largest coordinate in play.
     """
 
     inverse: Any
@@ -115,9 +138,7 @@ class _Slabs:
     @staticmethod
     def of(backend: Backend, tables: TriangleTables, ray: Ray) -> _Slabs:
         tiny = backend.Float(SMALLEST_COMPONENT)
-        d = backend.Vector3(
-            *(dr.select(dr.abs(c) < tiny, dr.select(c < 0, -tiny, tiny), c) for c in ray.d)
-        )
+        d = backend.Vector3(*(dr.select(dr.abs(c) < tiny, dr.select(c < 0, -tiny, tiny), c) for c in ray.d))
         pad = 8 * backend.epsilon * (max_abs(ray.o) + tables.extent)
         return _Slabs(dr.rcp(d), ray.o + pad, ray.o - pad)
 
@@ -130,4 +151,3 @@ class _Slabs:
         near = select_max(select_max(select_min(a.x, b.x), select_min(a.y, b.y)), select_min(a.z, b.z))
         far = select_min(select_min(select_max(a.x, b.x), select_max(a.y, b.y)), select_max(a.z, b.z))
         return select_max(near, backend.Float(0)) <= select_min(far, limit)
-

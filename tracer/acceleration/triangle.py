@@ -1,10 +1,11 @@
 """Ray against triangle: watertight, and safe for rays that start on a neighboring triangle.
 
-Inside test: the corners, relative to the origin, are projected along the ray onto two axes; the three edge functions
-of the projected triangle decide (Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, JCGT 2013). Two triangles
-that share a corner project it to the same two numbers, and the sign of an edge function a b - c d is computed without
-error (Kahan's difference of products), so a ray that is aimed at a shared edge or corner cannot pass between them.
-The distance comes from the plane of the triangle, whose unit normal was made in double precision.
+Inside test: the corners, relative to the origin, are projected along the ray onto two axes; the three edge
+functions of the projected triangle decide (Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, JCGT
+2013). Two triangles that share a corner project it to the same two numbers, and the sign of an edge function
+a b - c d is computed without error (Kahan's difference of products), so a ray that is aimed at a shared edge
+or corner cannot pass between them. The distance comes from the plane of the triangle, whose unit normal was
+made in double precision.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ TRIANGLE_WORDS = 12
 """Floats of a triangle in its table: three corners, unit normal (zero: degenerate, never hit)."""
 
 CONTACT_SLACK = 32
-"""Bound on the error of a hit point, in units of eps S: 8 across its surface, and up to 4 times that along it when the
-ray arrived at a slant (cosine above 1/4). A generous bound costs nothing, since what it admits is decided by geometry."""
+"""Bound on the error of a hit point, in units of eps S: 8 across its surface, and up to 4 times that along it
+when the ray arrived at a slant (cosine above 1/4). A generous bound costs nothing, since what it admits is
+decided by geometry."""
 
 
 @dataclass
@@ -53,7 +55,8 @@ def gather_triangle(backend: Backend, table: Any, index: Any, active: Any) -> Tr
 
 
 def projection_axes(d: Any) -> Projection:
-    """Two axes orthogonal to d, without a branch (Duff et al., Building an Orthonormal Basis, Revisited, 2017)."""
+    """Two axes orthogonal to d, without a branch (Duff et al., Building an Orthonormal Basis, Revisited,
+    2017)."""
     vector = type(d)
     sign = dr.select(d.z >= 0, type(d.z)(1), type(d.z)(-1))
     a = -dr.rcp(sign + d.z)
@@ -74,11 +77,11 @@ def difference_of_products(a: Any, b: Any, c: Any, d: Any) -> Any:
 class TriangleTest:
     """What one test finds.
 
-    `t`: distance to the plane, of either sign; `within`: the line passes inside the edges or exactly through one;
-    `owned`: the same, but of two triangles that share the edge only one claims it; `touched`: the line passes inside, or
-    misses an edge by no more than rounding; `height`: signed distance of the ray's origin from the plane; `speed`:
-    rate at which it grows; `slack`: a bound on the rounding error of `height`, `relative_slack` (32 eps) times the largest
-    coordinate of the origin and of the corners seen from it.
+    `t`: distance to the plane, of either sign; `within`: the line passes inside the edges or exactly through
+    one; `owned`: the same, but of two triangles that share the edge only one claims it; `touched`: the line
+    passes inside, or misses an edge by no more than rounding; `height`: signed distance of the ray's origin
+    from the plane; `speed`: rate at which it grows; `slack`: a bound on the rounding error of `height`,
+    `relative_slack` (32 eps) times the largest coordinate of the origin and of the corners seen from it.
     """
 
     t: Any
@@ -122,7 +125,7 @@ def meet_triangle(epsilon: float, triangle: Triangle, ray: Ray, axes: Projection
 
 
 def _owns(edge: Any, from_x: Any, from_y: Any, to_x: Any, to_y: Any) -> Any:
-    """Mask: a line exactly through this projected edge counts for this triangle; the neighbor runs along it the other
-    way, so of the two just one says so (the fill rule of rasterizers)."""
+    """Mask: a line exactly through this projected edge counts for this triangle; the neighbor runs along it
+    the other way, so of the two just one says so (the fill rule of rasterizers)."""
     upward = (to_y > from_y) | ((to_y == from_y) & (to_x > from_x))
     return (edge != 0) | upward

@@ -11,8 +11,8 @@ from typing import Any
 from tracer.cli.failures import report
 from tracer.errors import OutputError, TracerError, UsageError
 from tracer.film.atomic import check_writable, fill_template
-from tracer.render import Settings, _canvas, _checked, _rectangle
 from tracer.scene import Scene, find_scene, load
+from tracer.settings import Settings, picture_canvas, picture_rectangle
 
 DEFAULT_OUTPUT = "{name}.png"
 
@@ -50,14 +50,14 @@ def make_plan(
 
     Raises `UsageError` or `OutputError` for what concerns them all: options, files that cannot be written.
     """
-    checked = _checked(Settings(**settings))
+    checked = Settings(**settings).checked()
     plan = Plan([])
     files = _output_files(sources, templates or (DEFAULT_OUTPUT,), plan)
     for source in files:
         started = time.perf_counter()
         try:
             scene = load(source, allow_outside=allow_outside, overrides=overrides)
-            _rectangle(checked.crop, _canvas(scene, checked))
+            picture_rectangle(checked.crop, picture_canvas(scene, checked))
         except TracerError as error:
             plan.refuse(error)
         else:

@@ -1,8 +1,9 @@
-"""Depth of field: a filter over the finished picture that mixes pixels of similar distance (document, section 8).
+"""Depth of field: a filter over the finished picture that mixes pixels of similar distance (document, section
+8).
 
-For a pixel of depth x the blur measure is f = max(x/focus, focus/x). Draws go to pixels less than f columns and rows
-away whose distance from the eye differs by less than `depth_range`; the result is the mean of their first-pass
-colors. All arithmetic is in double precision on the depth as stored.
+For a pixel of depth x the blur measure is f = max(x/focus, focus/x). Draws go to pixels less than f columns
+and rows away whose distance from the eye differs by less than `depth_range`; the result is the mean of their
+first-pass colors. All arithmetic is in double precision on the depth as stored.
 """
 
 from __future__ import annotations
@@ -100,10 +101,10 @@ def _filter(
     key = (backend.opaque_id(settings.seed & 0xFFFFFFFF), backend.UInt32(DEPTH_OF_FIELD_STREAM))
     samples = backend.opaque_id(settings.samples)
 
-    # ---- Draws ----
-    # Every turn looks at one pixel of the window. A draw guesses; after 64 misses the window is walked row by row, once
-    # to count the admissible pixels and then up to the one that the draw names. Sums are of differences to the own
-    # color: where all colors are the same the result is exactly that color.
+    # ---- Draws ---- Every turn looks at one pixel of the window. A draw guesses; after 64 misses the window
+    # is walked row by row, once to count the admissible pixels and then up to the one that the draw names.
+    # Sums are of differences to the own color: where all colors are the same the result is exactly that
+    # color.
     total = dr.zeros(backend.Vector3, width)
     drawn = dr.zeros(backend.UInt32, width)
     attempt = dr.zeros(backend.UInt32, width)
@@ -158,7 +159,8 @@ def _eye_distance(backend: Backend, canvas: Canvas, column: Any, row: Any) -> An
 def _admissible(
     backend: Backend, first: _FirstPass, canvas: Canvas, column: Any, row: Any, eye: Any, depth_range: Any
 ) -> Any:
-    """Mask: the pixel is not blank and its distance from the eye differs from `eye` by less than the range."""
+    """Mask: the pixel is not blank and its distance from the eye differs from `eye` by less than the
+    range."""
     depth = dr.gather(backend.Float, first.depth, first.index(backend, column, row))
     distance = _eye_distance(backend, canvas, column, row) + depth
     return (depth > 0) & (dr.abs(distance - eye) < depth_range)

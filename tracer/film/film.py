@@ -15,8 +15,8 @@ BLANK = {"color": 0, "alpha": 0, "depth": -1, "z": np.inf, "shape": -1, "primiti
 class Film:
     """The layers of one rectangle of the picture.
 
-    Layers are (h, w) or (h, w, components) by name: `color`, `alpha`, `depth`, `z` (from the canvas along the view
-    axis) and those asked for. `counts`: rays by kind and how paths ended.
+    Layers are (h, w) or (h, w, components) by name: `color`, `alpha`, `depth`, `z` (from the canvas along the
+    view axis) and those asked for. `counts`: rays by kind and how paths ended.
     """
 
     def __init__(self, rectangle: Rectangle, dtype: Any, counts: dict[str, int]) -> None:

@@ -94,8 +94,9 @@ def _are_parallel(u: Vec3, v: Vec3) -> bool:
 class PlaneSlot:
     """One plane in a kernel: width-1 numbers that kernels read from memory.
 
-    Attributes: `n` unit normal, `d` with n.p + d = 0, `primitive` its id, `bit` its place in `Ray.sides` (a Python
-    int, part of the structure), or None from the 33rd plane on: then the side is the sign of the distance.
+    Attributes: `n` unit normal, `d` with n.p + d = 0, `primitive` its id, `bit` its place in `Ray.sides` (a
+    Python int, part of the structure), or None from the 33rd plane on: then the side is the sign of the
+    distance.
     """
 
     n: Any
@@ -106,7 +107,8 @@ class PlaneSlot:
     def hit(self, ray: Ray) -> tuple[Any, Any]:
         """Distance and mask of a hit: -(n.o + d) / n.direction, when the ray heads for the side it is not on.
 
-        Whether it is hit is decided by the side bit alone; rounding of the distance can only move the hit to t = 0.
+        Whether it is hit is decided by the side bit alone; rounding of the distance can only move the hit to
+        t = 0.
         """
         speed = dr.dot(self.n, ray.d)
         distance = dr.dot(self.n, ray.o) + self.d
@@ -122,7 +124,8 @@ class PlaneSlot:
         return keep_nearer(hit, *self.hit(ray), self.primitive)
 
     def blocks(self, segment: Segment, active: Any) -> Any:
-        """Mask: the plane lies strictly between the two ends, which is so when they are on different sides."""
+        """Mask: the plane lies strictly between the two ends, which is so when they are on different
+        sides."""
         if self.bit is not None:
             differs = (segment.ray.sides ^ segment.light_sides) & segment.light_decided
             return (differs & (1 << self.bit)) != 0
@@ -139,12 +142,14 @@ class PlaneSlot:
 
     @staticmethod
     def surface(row: Any, p: Any) -> tuple[Any, Any]:
-        """The point moved onto the plane, and the outward normal, from the plane's row (n, d) of the shape table."""
+        """The point moved onto the plane, and the outward normal, from the plane's row (n, d) of the shape
+        table."""
         n = type(p)(row.x, row.y, row.z)
         return p - (dr.dot(n, p) + row.w) * n, n
 
     def side_bit(self, ray_o: Any, ray_d: Any) -> Any:
-        """This plane's bit for a free ray; an origin exactly on the plane counts as having crossed it already."""
+        """This plane's bit for a free ray; an origin exactly on the plane counts as having crossed it
+        already."""
         distance = dr.dot(self.n, ray_o) + self.d
         above = (distance > 0) | ((distance == 0) & (dr.dot(self.n, ray_d) > 0))
         one = type(self.primitive)(1 << (self.bit or 0))

@@ -63,8 +63,8 @@ class SphereSlot:
     def hit(self, ray: Ray) -> tuple[Any, Any]:
         """Distance and mask of the nearest hit.
 
-        The quadratic is solved around the point of the ray that is closest to the center (Hearn and Baker; Haines et
-        al., Precision Improvements for Ray/Sphere Intersection, Ray Tracing Gems, 2019, chapter 7).
+        The quadratic is solved around the point of the ray that is closest to the center (Hearn and Baker;
+        Haines et al., Precision Improvements for Ray/Sphere Intersection, Ray Tracing Gems, 2019, chapter 7).
         """
         b, discriminant, outside = self._solve(ray)
         half_chord = dr.sqrt(discriminant)
@@ -78,19 +78,32 @@ class SphereSlot:
         return keep_nearer(hit, *self.hit(ray), self.primitive)
 
     def blocks(self, segment: Segment, active: Any) -> Any:
-        """Mask: the sphere lies strictly between the two ends; compares squares, so needs no square root."""
-        ray, length = segment.ray, segment.length
-        b, discriminant, outside = self._solve(ray)
-        past = b - length
-        near_hit = (b > 0) & (discriminant > 0) & ((past < 0) | (past * past < discriminant))
-        far_hit = (past < 0) & (past * past > discriminant)
-        return dr.select(outside, near_hit & ~ray.leaves(self.primitive), far_hit)
+        """Mask: the sphere lies strictly between the two ends; decided without a square root."""
+        near, far, outside = self._crossed(segment)
+        return dr.select(outside, near, far)
+
+    def crossings(self, segment: Segment, active: Any) -> Any:
+        """How many of its surfaces lie strictly between the two ends: 0, 1 or 2; the one left does not
+        count."""
+        near, far, outside = self._crossed(segment)
+        one = type(segment.length)(1)
+        return dr.select(outside & near, one, 0) + dr.select(far & (~outside | near), one, 0)
+
+    def _crossed(self, segment: Segment) -> tuple[Any, Any, Any]:
+        """Masks: the near surface is crossed on the way (if the ray starts outside), the far one is, and
+        the ray
+        starts outside. A light that lies on the sphere within rounding has not crossed the surface it lies on."""
+        b, discriminant, outside = self._solve(segment.ray)
+        light = dr.squared_norm(segment.light - self.center) - self.radius * self.radius
+        past_middle = b < segment.length
+        meets = (b > 0) & (discriminant > 0) & ~segment.ray.leaves(self.primitive)
+        return meets & (past_middle | (light < -self.margin)), past_middle & (light > self.margin), outside
 
     def _solve(self, ray: Ray) -> tuple[Any, Any, Any]:
         """Distance to the closest approach, half chord squared, and whether the origin is outside.
 
-        A ray that leaves this sphere knows its side. One that leaves another surface within the margin counts as
-        outside: a ball that rests on a plane is met from outside, however the contact point was rounded.
+        A ray that leaves this sphere knows its side. One that leaves another surface within the margin counts
+        as outside: a ball that rests on a plane is met from outside, however the contact point was rounded.
         """
         oc = ray.o - self.center
         b = -dr.dot(oc, ray.d)
@@ -100,17 +113,6 @@ class SphereSlot:
         margin = dr.select(ray.departing, -self.margin, 0)
         outside = dr.select(ray.leaves(self.primitive), ~ray.inside, dr.squared_norm(oc) - r2 > margin)
         return b, discriminant, outside
-
-    def crossings(self, segment: Segment, active: Any) -> Any:
-        """How many of its surfaces lie strictly between the two ends: 0, 1 or 2; the one that is left does not count."""
-        ray, length = segment.ray, segment.length
-        b, discriminant, outside = self._solve(ray)
-        half_chord = dr.sqrt(discriminant)
-        meets = (discriminant > 0) & (~outside | ((b > 0) & ~ray.leaves(self.primitive)))
-        one = type(length)(1)
-        near = dr.select(meets & outside & (b - half_chord < length), one, 0)
-        far = dr.select(meets & (b + half_chord < length), one, 0)
-        return near + far
 
     @staticmethod
     def surface(row: Any, p: Any) -> tuple[Any, Any]:

@@ -10,7 +10,7 @@ import drjit as dr
 import numpy as np
 
 from tracer.backends import Backend
-from tracer.ray import Hit, Ray, Segment, keep_nearer
+from tracer.ray import Hit, Ray, Segment
 from tracer.shapes.sphere import SphereSlot, contact_margin
 
 
@@ -37,9 +37,7 @@ class SphereTable:
 
     def closest(self, ray: Ray, hit: Hit, active: Any) -> Hit:
         """The nearest of `hit` and all spheres."""
-        return self.fold(
-            hit, active, lambda hit, s: keep_nearer(hit, *s.hit(ray), s.primitive), lambda hit: True
-        )
+        return self.fold(hit, active, lambda hit, sphere: sphere.closest(ray, hit, active), lambda hit: True)
 
     def blocks(self, segment: Segment, active: Any) -> Any:
         """Mask: a sphere lies strictly between the two ends."""

@@ -1,8 +1,8 @@
 """From a coordinate to the number of a cell (document, sections 3.3 and 6).
 
-F(q) = floor(q + eps): the small value puts a surface that lies exactly on a border into one cell all over. It must
-outweigh the rounding of the point, so it grows with the point's largest coordinate in single precision. It outweighs
-also that coordinates are multiplied by 1/interval in place of a division.
+F(q) = floor(q + eps): the small value puts a surface that lies exactly on a border into one cell all over. It
+must outweigh the rounding of the point, so it grows with the point's largest coordinate in single precision.
+It outweighs also that coordinates are multiplied by 1/interval in place of a division.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from tracer.ray import select_max
 
 @dataclass
 class CellRule:
-    """How coordinates become cells: `truncate` (a mask) asks for the document's own rule, rounding towards zero."""
+    """How coordinates become cells: `truncate` (a mask) asks for the document's own rule, rounding towards
+    zero."""
 
     backend: Backend
     truncate: Any
@@ -36,7 +37,8 @@ class CellRule:
         return dr.select(self.truncate, toward_zero, dr.floor(q + shift))
 
     def magnitude(self, cell: Any) -> Any:
-        """|cell| where the document's rule holds (it counts cells by absolute value), else the cell itself."""
+        """|cell| where the document's rule holds (it counts cells by absolute value), else the cell
+        itself."""
         return cell if self.truncate is False else dr.select(self.truncate, dr.abs(cell), cell)
 
 

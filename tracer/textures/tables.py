@@ -1,7 +1,7 @@
 """All textures of a scene in Dr.Jit memory, and the color of a point.
 
-Every kind ends in the number of an entry of one palette: solid, stripes and checker store their colors there, pictures
-their texels, row by row.
+Every kind ends in the number of an entry of one palette: solid, stripes and checker store their colors there,
+pictures their texels, row by row.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ KIND_MASK = 3
 
 @dataclass(frozen=True)
 class PackedTexture:
-    """One texture on the host: `flags` (kind and options), `first` palette entry, `count` of colors (a picture: its
-    columns), `lines` of a picture, cells per scene unit `rate`, 2x4 `matrix` of a picture."""
+    """One texture on the host: `flags` (kind and options), `first` palette entry, `count` of colors (a
+    picture: its columns), `lines` of a picture, cells per scene unit `rate`, 2x4 `matrix` of a picture."""
 
     flags: int
     first: int
@@ -54,7 +54,8 @@ class TextureTables:
 
 @dataclass
 class TextureRow:
-    """The texture of each of n points (n,): see `PackedTexture`; `shape` says where to find the rest of a picture."""
+    """The texture of each of n points (n,): see `PackedTexture`; `shape` says where to find the rest of a
+    picture."""
 
     flags: Any
     first: Any
@@ -73,8 +74,8 @@ class TextureRow:
 
 
 class TexturePacker:
-    """Collects textures and their palette. `decode` takes colors (n, 3) to the color space of the shading, `read`
-    turns a picture's file name into texels (h, w, 3)."""
+    """Collects textures and their palette. `decode` takes colors (n, 3) to the color space of the shading,
+    `read` turns a picture's file name into texels (h, w, 3)."""
 
     def __init__(
         self,
