@@ -1,6 +1,6 @@
-"""Draws the pictures of the scenes into this folder: fox.png, forest.png and marble.png.
+"""Draws the pictures of the scenes: fox.png, forest.png and marble.png.
 
-Run `python assets/make_wallpapers.py [FOLDER]`; the pictures are the same on every machine, pixel by pixel.
+Run `python assets/make_wallpapers.py [FOLDER]`: without a folder, into this one.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 
 import cv2
-
 from drawing import forest, fox, marble
 
 PICTURES = {"fox.png": fox.draw, "forest.png": forest.draw, "marble.png": marble.draw}

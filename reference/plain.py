@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 import struct
 import sys
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,6 +32,7 @@ BLANK = -1.0  # the depth of a ray that hits nothing
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 GOLDEN_FRACTION = (math.sqrt(5) - 1) / 2
 DRAW_ATTEMPTS = 64
+LARGE_WINDOW = 4096  # pixels of a window above which draws are made by distance
 DEPTH_OF_FIELD_STREAM, LIGHT_JITTER_STREAM = 1, 2
 
 
@@ -1026,14 +1028,32 @@ def blurred(camera: Camera, lens: DepthOfField, scale: float, whole: Picture, bo
     x0, y0, x1, y1 = box
     part = (slice(y0, y1), slice(x0, x1))
     color = whole.color[part].copy()
+    by_distance = sorted_by_distance(camera, whole)
     for j in range(y0, y1):
         for i in range(x0, x1):
             if whole.depth[j, i] != BLANK:
-                color[j - y0, i - x0] = blurred_pixel(camera, lens, scale, whole, i, j)
+                color[j - y0, i - x0] = blurred_pixel(camera, lens, scale, whole, by_distance, i, j)
     return Picture(color, whole.depth[part], whole.coverage[part], whole.counts)
 
 
-def blurred_pixel(camera: Camera, lens: DepthOfField, scale: float, whole: Picture, i: int, j: int) -> Vec:
+def sorted_by_distance(camera: Camera, whole: Picture) -> list[tuple[float, int, int]]:
+    """(distance from the eye, row, column) of the pixels that are not blank, the nearest first."""
+    return sorted(
+        (eye_distance(camera, i, j, float(depth)), j, i)
+        for (j, i), depth in np.ndenumerate(whole.depth)
+        if depth != BLANK
+    )
+
+
+def blurred_pixel(
+    camera: Camera,
+    lens: DepthOfField,
+    scale: float,
+    whole: Picture,
+    by_distance: Sequence[tuple[float, int, int]],
+    i: int,
+    j: int,
+) -> Vec:
     """The mean of `samples` draws, by differences to the own color: in focus it stays exactly the same."""
     x = float(whole.depth[j, i])
     size = max(x / lens.focus, lens.focus / x) * scale  # f(x) S
@@ -1047,9 +1067,15 @@ def blurred_pixel(camera: Camera, lens: DepthOfField, scale: float, whole: Pictu
         apart = abs(eye_distance(camera, column, row, depth) - own_distance)
         return depth != BLANK and apart < lens.depth_range
 
+    similar = None
+    if len(columns) * len(rows) > LARGE_WINDOW:
+        begin = bisect_right(by_distance, -lens.depth_range, key=lambda pixel: pixel[0] - own_distance)
+        end = bisect_left(by_distance, lens.depth_range, key=lambda pixel: pixel[0] - own_distance)
+        if end - begin < len(columns) * len(rows):
+            similar = [(column, row) for _, row, column in by_distance[begin:end]]
     own, difference = vec(whole.color[j, i]), BLACK
     for k in range(lens.samples):
-        column, row = draw(j * camera.width + i, k, lens.seed, columns, rows, admissible)
+        column, row = draw(j * camera.width + i, k, lens.seed, columns, rows, admissible, similar)
         difference += vec(whole.color[row, column]) - own
     return own + difference / lens.samples
 
@@ -1060,16 +1086,30 @@ def eye_distance(camera: Camera, i: int, j: int, depth: float) -> float:
 
 
 def draw(
-    pixel: int, k: int, seed: int, columns: range, rows: range, admissible: Callable[[int, int], bool]
+    pixel: int,
+    k: int,
+    seed: int,
+    columns: range,
+    rows: range,
+    admissible: Callable[[int, int], bool],
+    similar: Sequence[tuple[int, int]] | None = None,
 ) -> tuple[int, int]:
-    """Draw k, uniform over the admissible pixels of the window; after 64 misses by an exact choice."""
+    """Draw k, uniform over the admissible pixels of the window; after 64 misses by an exact choice.
+
+    It guesses in the window, or (in a large one) among the `similar` pixels, those of similar distance, if
+    they are fewer.
+    """
     key = (seed % 2**32, DEPTH_OF_FIELD_STREAM)
     for attempt in range(DRAW_ATTEMPTS):
         words = philox((pixel, k, attempt, 0), key)
-        column, row = columns[choice(words[0], len(columns))], rows[choice(words[1], len(rows))]
-        if admissible(column, row):
+        if similar is None:
+            column, row = columns[choice(words[0], len(columns))], rows[choice(words[1], len(rows))]
+        else:
+            column, row = similar[choice(words[0], len(similar))]
+        if column in columns and row in rows and admissible(column, row):
             return column, row
-    candidates = [(column, row) for row in rows for column in columns if admissible(column, row)]
+    pixels = [(column, row) for row in rows for column in columns] if similar is None else similar
+    candidates = [at for at in pixels if at[0] in columns and at[1] in rows and admissible(*at)]
     return candidates[choice(philox((pixel, k, DRAW_ATTEMPTS, 0), key)[0], len(candidates))]
 
 

@@ -17,7 +17,7 @@ from tracer.backends import Backend, exact_arithmetic, find_backend, thread_coun
 from tracer.canvas import DeviceCanvas
 from tracer.color import encode_srgb
 from tracer.device_scene import DeviceScene, compile_scene
-from tracer.film.depth_of_field import blur_reach, depth_of_field
+from tracer.film.depth_of_field import depth_of_field, rectangle_needed
 from tracer.film.film import Film
 from tracer.film.result import Result
 from tracer.scene import Scene
@@ -157,14 +157,7 @@ class _Job:
         settings = self.scene.camera.depth_of_field
         if settings is None or settings.focus < 0:
             return film
-        reach = blur_reach(film.depth, settings, self.canvas)
-        x0, y0, x1, y1 = self.rectangle
-        wide = (
-            max(0, x0 - reach),
-            max(0, y0 - reach),
-            min(self.canvas.width, x1 + reach),
-            min(self.canvas.height, y1 + reach),
-        )
+        wide = rectangle_needed(self.rectangle, film.depth, settings, self.canvas)
         source = film if wide == self.rectangle else self._trace(wide)
         film.color = depth_of_field(
             self.backend, source.color, source.depth, source.rectangle, self.rectangle, settings, self.canvas

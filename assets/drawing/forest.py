@@ -15,16 +15,22 @@ WOOD, BARK, BIRCH, INK, CREAM = "#7a5543", "#5b4036", "#f8f4e8", "#4c4540", "#ff
 
 TIER = path("M 0 -58 C 10 -34 26 -10 44 2 C 30 8 16 6 0 6 C -16 6 -30 8 -44 2 C -26 -10 -10 -34 0 -58")
 TIER_SHADE = path("M 0 -58 C 10 -34 26 -10 44 2 C 30 8 16 6 0 6 C 8 -12 8 -34 0 -58")
-DROP = path("M 0 -168 C 26 -128 46 -92 46 -60 C 46 -30 26 -16 0 -16 C -26 -16 -46 -30 -46 -60 C -46 -92 -26 -128 0 -168")
+DROP = path(
+    "M 0 -168 C 26 -128 46 -92 46 -60 C 46 -30 26 -16 0 -16"
+    " C -26 -16 -46 -30 -46 -60 C -46 -92 -26 -128 0 -168"
+)
 DROP_SHADE = path("M 0 -168 C 26 -128 46 -92 46 -60 C 46 -30 26 -16 0 -16 C 20 -50 20 -120 0 -168")
 CROWN = path(
     "M -58 -84 C -62 -112 -42 -132 -24 -130 C -14 -152 26 -152 34 -128 C 56 -128 66 -102 56 -82"
     " C 62 -58 38 -44 22 -50 C 8 -40 -12 -40 -22 -50 C -44 -46 -62 -62 -58 -84"
 )
 CROWN_SHADE = path(
-    "M 34 -128 C 56 -128 66 -102 56 -82 C 62 -58 38 -44 22 -50 C 8 -40 -12 -40 -22 -50 C 20 -56 42 -84 34 -128"
+    "M 34 -128 C 56 -128 66 -102 56 -82 C 62 -58 38 -44 22 -50 C 8 -40 -12 -40 -22 -50"
+    " C 20 -56 42 -84 34 -128"
 )
-BUSH = path("M -34 4 C -40 -18 -20 -24 -14 -18 C -10 -36 14 -36 16 -18 C 28 -24 40 -12 34 4 C 16 12 -16 12 -34 4")
+BUSH = path(
+    "M -34 4 C -40 -18 -20 -24 -14 -18 C -10 -36 14 -36 16 -18 C 28 -24 40 -12 34 4 C 16 12 -16 12 -34 4"
+)
 BIRD = path("M -20 -3 C -12 -12 2 -12 9 -4 L 18 -2 L 9 2 C 4 11 -8 11 -14 4 L -30 8")
 BIRD_WING = path("M -14 -3 C -6 -6 2 -4 4 0 C 0 6 -10 6 -18 8 C -16 4 -16 0 -14 -3")
 
@@ -99,12 +105,15 @@ PLANTS = {"fir": _fir, "leafy": _leafy, "oak": _oak, "birch": _birch, "bush": _b
 
 # By hill, from left to right; a plant stands on the line of its hill.
 FOREST: tuple[tuple[Piece, ...], ...] = (
-    (("fir", 70, 1.0, PINE), ("birch", 150, 0.95, MOSS), ("toadstool", 205, 0.8, RUST), ("oak", 285, 1.05, FERN),
-     ("leafy", 402, 0.86, SPRUCE), ("fir", 476, 0.82, SPRUCE), ("bush", 528, 0.7, FERN), ("oak", 604, 0.8, OCHRE)),
-    (("leafy", 36, 1.0, FERN), ("bush", 104, 0.8, MOSS), ("fir", 190, 1.08, SPRUCE), ("fir", 252, 0.7, PINE),
-     ("birch", 346, 1.0, OCHRE), ("oak", 448, 0.95, SPRUCE), ("toadstool", 512, 0.9, RUST), ("fir", 566, 0.96, PINE)),
-    (("oak", 96, 1.0, SPRUCE), ("toadstool", 22, 0.9, RUST), ("leafy", 196, 0.9, RUST), ("bush", 262, 0.8, FERN),
-     ("fir", 338, 1.0, PINE), ("birch", 416, 0.9, FERN), ("leafy", 522, 1.02, PINE), ("fir", 600, 0.74, FERN)),
+    (("fir", 70, 1.0, PINE), ("birch", 150, 0.95, MOSS), ("toadstool", 205, 0.8, RUST),
+     ("oak", 285, 1.05, FERN), ("leafy", 402, 0.86, SPRUCE), ("fir", 476, 0.82, SPRUCE),
+     ("bush", 528, 0.7, FERN), ("oak", 604, 0.8, OCHRE)),
+    (("leafy", 36, 1.0, FERN), ("bush", 104, 0.8, MOSS), ("fir", 190, 1.08, SPRUCE),
+     ("fir", 252, 0.7, PINE), ("birch", 346, 1.0, OCHRE), ("oak", 448, 0.95, SPRUCE),
+     ("toadstool", 512, 0.9, RUST), ("fir", 566, 0.96, PINE)),
+    (("oak", 96, 1.0, SPRUCE), ("toadstool", 22, 0.9, RUST), ("leafy", 196, 0.9, RUST),
+     ("bush", 262, 0.8, FERN), ("fir", 338, 1.0, PINE), ("birch", 416, 0.9, FERN),
+     ("leafy", 522, 1.02, PINE), ("fir", 600, 0.74, FERN)),
 )  # fmt: skip
 BIRDS = ((530.0, 84.0, 0.9, False, ROSE), (104.0, 284.0, 0.9, True, ROSE), (268.0, 512.0, 0.9, True, ROSE))
 
@@ -149,7 +158,7 @@ def _hill(sheet: Sheet, hill: int, lift: float) -> None:
 
 
 def draw() -> NDArray[np.uint8]:
-    """640 x 640 texels; the hills are drawn from the farthest (top) to the nearest, once more above and below."""
+    """640 x 640 texels; hills are drawn from the farthest (top) to the nearest, once more above and below."""
     sheet = Sheet(WIDTH, HEIGHT, HILLS[-1])
     for lift in (-float(HEIGHT), 0.0, float(HEIGHT)):
         for hill in range(len(HILLS)):

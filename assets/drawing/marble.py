@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from drawing.sheet import rgb
+from drawing.sheet import mean, rgb
 
 SIZE = 512
 FINE = 4
@@ -24,19 +24,13 @@ def draw() -> NDArray[np.uint8]:
     for across, down, phase, swing in _WAVES:
         y = y + swing * np.sin(across * x + phase)
         x = x + 1.6 * swing * np.sin(down * y - phase)
-    return _mean(_colors(2.0 * y * len(BANDS) / (2.0 * np.pi)))
+    return mean(_colors(2.0 * y * len(BANDS) / (2.0 * np.pi)), FINE)
 
 
 def _colors(place: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Bands of one color each with a vein between two; `place` counts them, and starts again after the last."""
+    """Bands of one color each, and a vein between two; `place` counts them and wraps around."""
     palette = np.array([rgb(color) for color in BANDS], dtype=np.uint8)
     band = np.floor(place)
     colors = palette[band.astype(np.int64) % len(BANDS)]
     colors[place - band < _VEIN_SHARE] = rgb(VEIN)
     return colors
-
-
-def _mean(fine: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The mean of FINE x FINE cells, in whole numbers."""
-    cells = fine.reshape(SIZE, FINE, SIZE, FINE, 3).astype(np.uint32)
-    return ((cells.sum(axis=(1, 3)) + FINE * FINE // 2) // (FINE * FINE)).astype(np.uint8)

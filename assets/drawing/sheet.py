@@ -1,8 +1,8 @@
 """A sheet of wallpaper: filled paths that wrap around its edges, so that the finished picture tiles.
 
-Coordinates are texels, x to the right and y down, as in SVG. Shapes are rasterized without smoothing on a grid
-that is `FINE` times finer, and `picture` takes the mean: edges are smooth, and the result is whole-number
-arithmetic that does not depend on the machine.
+Coordinates are texels, x to the right and y down, as in SVG. Shapes are rasterized without smoothing on a
+grid that is `FINE` times finer, and `picture` takes the mean: edges are smooth, and all that follows the
+rounding of the corners is whole-number arithmetic.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def rgb(color: str) -> tuple[int, int, int]:
 
 
 def path(text: str) -> Outline:
-    """The points of an SVG path of absolute commands M, L and C (a cubic Bezier curve), closed by who fills it."""
+    """The points of an SVG path of absolute commands M, L and C (a cubic Bezier curve)."""
     points: list[NDArray[np.float64]] = []
     for command, numbers in re.findall(r"([MLC])([^MLC]*)", text):
         corners = np.array([float(word) for word in numbers.split()]).reshape(-1, 2)
@@ -54,6 +54,15 @@ def ellipse(x: float, y: float, rx: float, ry: float | None = None) -> Outline:
 def mirrored(outline: Outline) -> Outline:
     """The outline with left and right exchanged."""
     return outline * [-1.0, 1.0]
+
+
+def mean(fine: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
+    """Each texel is the rounded mean of `factor` x `factor` fine ones; whole-number arithmetic."""
+    height, width = fine.shape[0] // factor, fine.shape[1] // factor
+    rows = fine.reshape(height, factor, width * factor * 3).sum(axis=1, dtype=np.uint32)
+    cells = rows.reshape(height, width, factor, 3).sum(axis=2)
+    count = factor * factor
+    return ((cells + count // 2) // count).astype(np.uint8)
 
 
 class Sheet:
@@ -88,9 +97,7 @@ class Sheet:
 
     def picture(self) -> NDArray[np.uint8]:
         """The finished sheet, (height, width, 3), red first."""
-        cells = self._fine.reshape(self.height, FINE, self.width, FINE, 3).astype(np.uint32)
-        count = FINE * FINE
-        return ((cells.sum(axis=(1, 3)) + count // 2) // count).astype(np.uint8)
+        return mean(self._fine, FINE)
 
     def _placed(self, outline: Outline) -> Outline:
         angle = np.radians(self._turn)

@@ -114,7 +114,8 @@ def _bounce_off(
         t = x * np.sin(opening) / np.sin(phi - opening) / np.sqrt(1 - y**2)
         reach = np.maximum(x * np.sin(phi) / np.sin(phi - opening) / 2, np.abs(p[:, 1] + y * t)) / size
     meets = (phi > opening) & (opening < np.pi)
-    used &= ~meets | (np.abs(reach - 1) > 2 * doubt)
+    noise = bound("position", "single", extent) / size * (1 + reach) / np.abs(np.sin(phi - opening))
+    used &= ~meets | (np.abs(reach - 1) > 2 * doubt + noise)
     cosine = np.abs(np.sin(phi - opening)) * np.sqrt(1 - y**2)
     unit = bound("contact distance", "single", extent) / TOLERANCES["contact distance"].value
     _count(tally, found, used, meets & (reach < 1), np.where(meets, t, 0), cosine / unit, face)

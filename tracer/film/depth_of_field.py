@@ -18,11 +18,18 @@ from tracer.backends import Backend, find_backend
 from tracer.camera import DepthOfField
 from tracer.canvas import Canvas
 from tracer.random import DEPTH_OF_FIELD_STREAM, below, philox
+from tracer.tiles import Rectangle
 
 ATTEMPTS = 64
-"""Misses after which a draw stops guessing and counts the pixels it may take."""
+"""Misses after which a draw stops guessing and walks through the pixels it may take."""
+
+LARGE_WINDOW = 4096
+"""Pixels of a window above which a draw guesses among the pixels of similar distance, if those are fewer."""
 
 LARGEST_REACH = 1 << 20
+
+PIXELS_PER_LAUNCH = 1 << 18
+"""Few enough for an answer to Ctrl-C."""
 
 
 def blur_reach(depth: np.ndarray, settings: DepthOfField, canvas: Canvas) -> int:
@@ -34,9 +41,32 @@ def blur_reach(depth: np.ndarray, settings: DepthOfField, canvas: Canvas) -> int
     return int(min(np.ceil(measure * canvas.scale) - 1, LARGEST_REACH))
 
 
+def rectangle_needed(
+    target: Rectangle, depth: np.ndarray, settings: DepthOfField, canvas: Canvas
+) -> Rectangle:
+    """The pixels that the filter reads for `target`, whose first pass has that depth (h, w).
+
+    Windows that are large are drawn from by distance, for which the whole picture counts.
+    """
+    reach = blur_reach(depth, settings, canvas)
+    if (2 * reach + 1) ** 2 > LARGE_WINDOW:
+        return (0, 0, canvas.width, canvas.height)
+    x0, y0, x1, y1 = target
+    return (
+        max(0, x0 - reach),
+        max(0, y0 - reach),
+        min(canvas.width, x1 + reach),
+        min(canvas.height, y1 + reach),
+    )
+
+
 @dataclass
 class _FirstPass:
-    """The picture that the filter reads, in Dr.Jit memory, for the rectangle x0, y0 .. (width columns)."""
+    """The picture that the filter reads, in Dr.Jit memory, for the rectangle x0, y0 .. x1, y1.
+
+    `by_distance`, where windows are large: distances from the eye in rising order, and the pixels that have
+    them, row times 65536 plus column.
+    """
 
     color: Any
     depth: Any
@@ -44,37 +74,56 @@ class _FirstPass:
     y0: int
     x1: int
     y1: int
+    by_distance: tuple[Any, Any] | None = None
 
     def index(self, backend: Backend, column: Any, row: Any) -> Any:
         """Place of a pixel of the full picture in the arrays."""
         width = backend.opaque_id(self.x1 - self.x0)
         return (row - backend.opaque_id(self.y0)) * width + (column - backend.opaque_id(self.x0))
 
+    def sort_by_distance(self, backend: Backend, canvas: Canvas) -> None:
+        """Fills `by_distance`; of equal distances the lower pixel comes first."""
+        width = self.x1 - self.x0
+        lane = dr.arange(backend.UInt32, width * (self.y1 - self.y0))
+        row = lane // backend.opaque_id(width)
+        column = lane - row * backend.opaque_id(width) + self.x0
+        row = row + self.y0
+        distance = (_eye_distance(backend, canvas, column, row) + self.depth).numpy()
+        order = np.argsort(np.where(self.depth.numpy() > 0, distance, np.inf), kind="stable")
+        order = order[: np.count_nonzero(self.depth.numpy() > 0)]
+        places = (row.numpy()[order] << np.uint32(16)) | column.numpy()[order]
+        self.by_distance = backend.table(distance[order]), backend.id_table(places)
+
 
 def depth_of_field(
     backend: Backend,
     color: np.ndarray,
     depth: np.ndarray,
-    source: tuple[int, int, int, int],
-    target: tuple[int, int, int, int],
+    source: Rectangle,
+    target: Rectangle,
     settings: DepthOfField,
     canvas: Canvas,
 ) -> np.ndarray:
     """The filtered colors (h, w, 3) of the rectangle `target` from a first pass over the rectangle `source`.
 
-    `color` (h', w', 3), `depth` (h', w'): the first pass, at least as far as the filter reaches.
+    `color` (h', w', 3), `depth` (h', w'): the first pass, at least over `rectangle_needed`.
     """
     double = find_backend(backend.name, "double")
     first = _FirstPass(double.table(color), double.table(depth), *source)
+    if (2 * blur_reach(depth, settings, canvas) + 1) ** 2 > LARGE_WINDOW:
+        first.sort_by_distance(double, canvas)
     x0, y0, x1, y1 = target
     width, height = x1 - x0, y1 - y0
-    lane = dr.arange(double.UInt32, width * height)
-    row = lane // double.opaque_id(width)
-    column = lane - row * double.opaque_id(width)
-    mixed = _filter(
-        double, first, column + double.opaque_id(x0), row + double.opaque_id(y0), settings, canvas
-    )
-    return np.ascontiguousarray(mixed.numpy().T.reshape(height, width, 3), dtype=color.dtype)
+    result = np.empty((height, width, 3), color.dtype)
+    rows = max(1, PIXELS_PER_LAUNCH // width)
+    for top in range(0, height, rows):
+        lines = min(rows, height - top)
+        lane = dr.arange(double.UInt32, width * lines)
+        row = lane // double.opaque_id(width)
+        column = lane - row * double.opaque_id(width) + double.opaque_id(x0)
+        mixed = _filter(double, first, column, row + double.opaque_id(y0 + top), settings, canvas)
+        result[top : top + lines] = mixed.numpy().T.reshape(lines, width, 3)
+    return result
 
 
 @dr.syntax
@@ -101,15 +150,25 @@ def _filter(
     key = (backend.opaque_id(settings.seed & 0xFFFFFFFF), backend.UInt32(DEPTH_OF_FIELD_STREAM))
     samples = backend.opaque_id(settings.samples)
 
-    # ---- Draws ---- Every turn looks at one pixel of the window. A draw guesses; after 64 misses the window
-    # is walked row by row, once to count the admissible pixels and then up to the one that the draw names.
-    # Sums are of differences to the own color: where all colors are the same the result is exactly that
-    # color.
+    # ---- Where to draw from: the window, or the pixels of similar distance if those are fewer ----
+    size = columns * rows
+    begin = dr.zeros(backend.UInt32, width)
+    by_distance = dr.full(backend.Bool, False, width)
+    if dr.hint(first.by_distance is not None, mode="scalar"):
+        begin, count = _similar(backend, first, eye, depth_range)
+        by_distance = (size > LARGE_WINDOW) & (count < size)
+        size = dr.select(by_distance, count, size)
+
+    # ---- Draws ----
+    # Every turn looks at one pixel of that set. A draw guesses; after 64 misses the set is walked, once to
+    # count the admissible pixels and then up to the one that the draw names. Sums are of differences to the
+    # own color: where all colors are the same the result is exactly that color.
     total = dr.zeros(backend.Vector3, width)
     drawn = dr.zeros(backend.UInt32, width)
     attempt = dr.zeros(backend.UInt32, width)
     admissible = dr.zeros(backend.UInt32, width)  # 0: not counted yet
     passed = dr.zeros(backend.UInt32, width)  # admissible pixels that the walk has left behind
+    walked = dr.zeros(backend.UInt32, width)  # pixels that the walk has left behind
     walk_column, walk_row = low_column + 0, low_row + 0
     one, none = backend.UInt32(1), backend.UInt32(0)
     active = sharp & (reach > 0)
@@ -118,7 +177,15 @@ def _filter(
         guesses = attempt < ATTEMPTS
         at_column = dr.select(guesses, low_column + below(words[0], columns), walk_column)
         at_row = dr.select(guesses, low_row + below(words[1], rows), walk_row)
-        fits = _admissible(backend, first, canvas, at_column, at_row, eye, depth_range)
+        if dr.hint(first.by_distance is not None, mode="scalar"):
+            rank = begin + dr.select(guesses, below(words[0], size), walked)
+            place = dr.gather(backend.UInt32, first.by_distance[1], rank, by_distance & active)
+            at_column = dr.select(by_distance, place & 0xFFFF, at_column)
+            at_row = dr.select(by_distance, place >> 16, at_row)
+        in_window = (at_column - low_column < columns) & (at_row - low_row < rows)
+        fits = in_window & _admissible(
+            backend, first, canvas, at_column, at_row, eye, depth_range, in_window & active
+        )
         chosen = (admissible > 0) & (passed == below(words[0], admissible))
         taken = active & fits & (guesses | chosen)
         found = dr.gather(backend.Vector3, first.color, first.index(backend, at_column, at_row), taken)
@@ -127,16 +194,32 @@ def _filter(
 
         # ---- The next pixel of the walk; back to its start when it ends ----
         passed += dr.select(fits & ~guesses, one, none)
-        row_ends = at_column + 1 == low_column + columns
-        window_ends = row_ends & (at_row + 1 == low_row + rows)
-        admissible = dr.select(~guesses & window_ends & (admissible == 0), passed, admissible)
-        restarts = guesses | taken | window_ends
-        passed = dr.select(restarts, 0, passed)
-        walk_row = dr.select(restarts, low_row, dr.select(row_ends, walk_row + 1, walk_row))
-        walk_column = dr.select(restarts | row_ends, low_column, walk_column + 1)
+        ends = walked + 1 == size
+        admissible = dr.select(~guesses & ends & (admissible == 0), passed, admissible)
+        restarts = guesses | taken | ends
+        line_ends = walk_column + 1 == low_column + columns
+        passed = dr.select(restarts, none, passed)
+        walked = dr.select(restarts, none, walked + 1)
+        walk_row = dr.select(restarts, low_row, dr.select(line_ends, walk_row + 1, walk_row))
+        walk_column = dr.select(restarts | line_ends, low_column, walk_column + 1)
         attempt = dr.select(taken, none, dr.select(guesses, attempt + 1, attempt))
         active &= drawn < samples
     return own + total / backend.Float(samples)
+
+
+def _similar(backend: Backend, first: _FirstPass, eye: Any, depth_range: Any) -> tuple[Any, Any]:
+    """The pixels whose distance differs by less than the range: their first place in the order, their
+    count."""
+    assert first.by_distance is not None
+    distances = first.by_distance[0]
+    count = dr.width(distances)
+
+    def difference(place: Any) -> Any:
+        return dr.gather(backend.Float, distances, place, place < count) - eye
+
+    begin = dr.binary_search(0, count, lambda i: (i < count) & (difference(i) <= -depth_range))
+    end = dr.binary_search(0, count, lambda i: (i < count) & (difference(i) < depth_range))
+    return backend.UInt32(begin), backend.UInt32(end) - backend.UInt32(begin)
 
 
 def _window(backend: Backend, center: Any, reach: Any, low: int, high: int) -> tuple[Any, Any]:
@@ -157,10 +240,17 @@ def _eye_distance(backend: Backend, canvas: Canvas, column: Any, row: Any) -> An
 
 
 def _admissible(
-    backend: Backend, first: _FirstPass, canvas: Canvas, column: Any, row: Any, eye: Any, depth_range: Any
+    backend: Backend,
+    first: _FirstPass,
+    canvas: Canvas,
+    column: Any,
+    row: Any,
+    eye: Any,
+    depth_range: Any,
+    active: Any,
 ) -> Any:
     """Mask: the pixel is not blank and its distance from the eye differs from `eye` by less than the
     range."""
-    depth = dr.gather(backend.Float, first.depth, first.index(backend, column, row))
+    depth = dr.gather(backend.Float, first.depth, first.index(backend, column, row), active)
     distance = _eye_distance(backend, canvas, column, row) + depth
     return (depth > 0) & (dr.abs(distance - eye) < depth_range)

@@ -1,0 +1,97 @@
+"""What docs/numerics.md says of arithmetic, directions and cells; without the remedy it is not so."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import numpy as np
+import pytest
+
+import tracer
+from tracer import spawn
+from tracer.backends import Backend, exact_arithmetic, find_backend
+from tracer.ray import normalize
+from tracer.textures.cells import CellRule
+
+PRECISIONS = ("single", "double")
+BOUNCES = 60
+
+
+def vectors(backend: Backend, seed: int, n: int = 10_000) -> tuple[Any, np.ndarray]:
+    """n vectors of lengths from 1e-3 to 1e3 in Dr.Jit, and the same numbers in extended precision."""
+    rng = np.random.default_rng(seed)
+    values = (rng.normal(size=(3, n)) * 10 ** rng.uniform(-3, 3, n)).astype(backend.dtype)
+    return backend.Vector3(*(backend.Float(row) for row in values)), values.astype(np.longdouble)
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_infinity_times_zero_is_not_a_number(precision: str) -> None:
+    backend = find_backend("llvm", precision)
+    values = backend.Float([np.inf, 1, 2])
+    with exact_arithmetic():
+        assert np.isnan((values * 0).numpy()[0])
+    with dr.scoped_set_flag(dr.JitFlag.FastMath, True):
+        assert (values * 0).numpy()[0] == 0
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_division_and_square_root_are_correctly_rounded(precision: str) -> None:
+    backend = find_backend("llvm", precision)
+    values = np.random.default_rng(1).uniform(1, 4, 10_000).astype(backend.dtype)
+    with exact_arithmetic():
+        x = backend.Float(values)
+        assert np.array_equal(dr.rcp(x).numpy(), 1 / values)
+        assert np.array_equal(dr.sqrt(x).numpy(), np.sqrt(values))
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_normalize_errs_by_few_roundings(precision: str) -> None:
+    """Three roundings in v.v count half, those of root, division and product once each: 4.5 eps."""
+    backend = find_backend("llvm", precision)
+    v, exact = vectors(backend, 2)
+    exact = exact / np.sqrt((exact**2).sum(axis=0))
+    with exact_arithmetic():
+        found = normalize(v).numpy()
+    assert np.abs(found / exact - 1).max() <= 4.5 * backend.epsilon
+
+
+def length_error_after_bounces(backend: Backend) -> float:
+    """How far |d| is from 1, in eps, after many reflections at random normals."""
+    with exact_arithmetic():
+        d = normalize(vectors(backend, 3, 1000)[0])
+        for bounce in range(BOUNCES):
+            d = spawn.mirror_direction(d, normalize(vectors(backend, 4 + bounce, 1000)[0]))
+            dr.eval(d)
+    length = np.sqrt((d.numpy().astype(np.longdouble) ** 2).sum(axis=0))
+    return float(np.abs(length - 1).max() / backend.epsilon)
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_directions_stay_unit_from_bounce_to_bounce(precision: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    backend = find_backend("llvm", precision)
+    assert length_error_after_bounces(backend) <= 4
+    monkeypatch.setattr(spawn, "_unit_again", lambda d: d)
+    assert length_error_after_bounces(backend) > 20
+
+
+def colors_on_a_border(precision: str) -> set[float]:
+    """The colors of a tilted plane that lies exactly on the border of two stripes."""
+    scene = tracer.load(
+        {
+            "ambient": 1.0,
+            "camera": {"resolution": [64, 48], "origin": [1.1, 3.0, 5.2], "target": [0, 0.3, 0], "fov": 40.0},
+            "textures": {"bands": {"kind": "stripes", "colors": ["#ffffff", "#000000"], "interval": 0.1}},
+            "shapes": [{"kind": "plane", "coefficients": [1, 1, 1, -0.3], "texture": "bands"}],
+        }
+    )
+    return set(tracer.render(scene, precision=precision).color.ravel().tolist())
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_a_plane_on_the_border_of_cells_has_one_color(
+    precision: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert colors_on_a_border(precision) == {0.0}
+    monkeypatch.setattr(CellRule, "cell", lambda rule, q, largest: dr.floor(q))
+    assert colors_on_a_border(precision) == {0.0, 1.0}
