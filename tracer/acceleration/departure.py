@@ -60,7 +60,23 @@ def meet_near_origin(
     above = dr.select(through_origin, _side(departure, triangle, test), test.height) > 0
     approaches = dr.select(above, test.speed < 0, test.speed > 0)
     t = select_max(test.t, type(test.t)(0))
-    return t, (rise > test.slack) & approaches & test.touched
+    meets = _within_edges(triangle, dr.fma(t, ray.d, ray.o), test.slack)
+    return t, (rise > test.slack) & approaches & meets
+
+
+def _within_edges(triangle: Triangle, p: Any, slack: Any) -> Any:
+    """Mask: a point of the triangle's plane lies inside its edges, or outside by no more than the slack.
+
+    Measured in that plane: seen along a ray that almost lies in it, the triangle is too thin to tell.
+    """
+    corners = (triangle.v0, triangle.v1, triangle.v2)
+    inside = None
+    for start, end in zip(corners, (*corners[1:], corners[0]), strict=True):
+        edge = end - start
+        beyond = dr.dot(dr.cross(triangle.normal, edge), p - start)
+        near = beyond >= -slack * dr.sqrt(dr.squared_norm(edge))
+        inside = near if inside is None else inside & near
+    return inside
 
 
 def _side(departure: Departure, triangle: Triangle, test: TriangleTest) -> Any:

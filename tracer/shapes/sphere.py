@@ -42,10 +42,11 @@ class Sphere(ShapeRecord):
 def contact_margin(row: np.ndarray, epsilon: float) -> float:
     """Bound on the rounding of |o-c|^2 - r^2 for an origin on a surface that touches the sphere.
 
-    A position there is known to 8 eps (|c| + r), and the square changes 2 r times as fast.
+    A position there is known to 8 eps (|c| + r) across its surface and to 4 times that along it, and the square
+    changes 2 r times as fast.
     """
     extent = float(np.abs(row[:3]).max() + row[3])
-    return 16 * epsilon * float(row[3]) * extent
+    return 64 * epsilon * float(row[3]) * extent
 
 
 @dataclass
@@ -68,9 +69,11 @@ class SphereSlot:
         """
         b, discriminant, outside = self._solve(ray)
         half_chord = dr.sqrt(discriminant)
+        own = ray.leaves(self.primitive)
         t = dr.select(outside, b - half_chord, b + half_chord)
-        approaches = ~outside | ((b > 0) & ~ray.leaves(self.primitive))
-        valid = (discriminant >= 0) & approaches & (ray.departing | (t > 0))
+        t = dr.select(own, 2 * b, t)  # one root is the origin; inside, the other is there however grazing
+        approaches = ~outside | ((b > 0) & ~own)
+        valid = ((discriminant >= 0) | own) & approaches & (ray.departing | (t > 0))
         return select_max(t, type(t)(0)), valid
 
     def closest(self, ray: Ray, hit: Hit, active: Any) -> Hit:
