@@ -60,8 +60,13 @@ def meet_near_origin(
     above = dr.select(through_origin, _side(departure, triangle, test), test.height) > 0
     approaches = dr.select(above, test.speed < 0, test.speed > 0)
     t = select_max(test.t, type(test.t)(0))
-    meets = _within_edges(triangle, dr.fma(t, ray.d, ray.o), test.slack)
-    return t, (rise > test.slack) & approaches & meets
+    # Through the origin the distance is known to slack / |speed| only: either end of that stretch may be
+    # the hit.
+    far = t + 2 * test.slack / dr.abs(test.speed)
+    meets = _within_edges(triangle, dr.fma(t, ray.d, ray.o), test.slack) | (
+        through_origin & _within_edges(triangle, dr.fma(far, ray.d, ray.o), test.slack)
+    )
+    return t, (rise > test.slack) & approaches & test.touched & meets
 
 
 def _within_edges(triangle: Triangle, p: Any, slack: Any) -> Any:

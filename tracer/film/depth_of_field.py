@@ -154,7 +154,8 @@ def _filter(
     size = columns * rows
     begin = dr.zeros(backend.UInt32, width)
     by_distance = dr.full(backend.Bool, False, width)
-    if dr.hint(first.by_distance is not None, mode="scalar"):
+    similar: Any = first.by_distance
+    if dr.hint(similar is not None, mode="scalar"):
         begin, count = _similar(backend, first, eye, depth_range)
         by_distance = (size > LARGE_WINDOW) & (count < size)
         size = dr.select(by_distance, count, size)
@@ -172,14 +173,14 @@ def _filter(
     walk_column, walk_row = low_column + 0, low_row + 0
     one, none = backend.UInt32(1), backend.UInt32(0)
     active = sharp & (reach > 0)
-    while dr.hint(active, label="depth of field", exclude=[backend, first, canvas, settings]):
+    while dr.hint(active, label="depth of field", exclude=[backend, first, canvas, settings, similar]):
         words = philox(key, (pixel, drawn, attempt, backend.UInt32(0)))
         guesses = attempt < ATTEMPTS
         at_column = dr.select(guesses, low_column + below(words[0], columns), walk_column)
         at_row = dr.select(guesses, low_row + below(words[1], rows), walk_row)
-        if dr.hint(first.by_distance is not None, mode="scalar"):
+        if dr.hint(similar is not None, mode="scalar"):
             rank = begin + dr.select(guesses, below(words[0], size), walked)
-            place = dr.gather(backend.UInt32, first.by_distance[1], rank, by_distance & active)
+            place = dr.gather(backend.UInt32, similar[1], rank, by_distance & active)
             at_column = dr.select(by_distance, place & 0xFFFF, at_column)
             at_row = dr.select(by_distance, place >> 16, at_row)
         in_window = (at_column - low_column < columns) & (at_row - low_row < rows)
