@@ -121,7 +121,7 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 class DeviceCanvas:
     """A canvas in a kernel: width-1 numbers that kernels read from memory.
 
-    `center` K, `x`, `y`: steps of one pixel along X and Y, `forward`: dis f, `axis`: f, `half_width`,
+    `center` K, `x`, `y`: steps of one pixel along X and Y, `forward`: dis f, `axis`: f, `distance`: dis, `half_width`,
     `half_height` in pixels, `offset` delta.
     """
 
@@ -130,6 +130,7 @@ class DeviceCanvas:
     y: Any
     forward: Any
     axis: Any
+    distance: Any
     half_width: Any
     half_height: Any
     offset: Any
@@ -143,6 +144,7 @@ class DeviceCanvas:
             y=backend.opaque_vector(canvas.y * canvas.pixel_size),
             forward=backend.opaque_vector(canvas.forward * canvas.distance),
             axis=backend.opaque_vector(canvas.forward),
+            distance=backend.opaque(canvas.distance),
             half_width=backend.opaque(canvas.width / 2),
             half_height=backend.opaque(canvas.height / 2),
             offset=backend.opaque(canvas.offset),

@@ -171,7 +171,7 @@ class _Job:
             color=film.color,
             depth=film.depth,
             alpha=film.alpha,
-            z=film.z + self.backend.dtype(canvas.distance),
+            z=film.z,
             aovs=layers | {name: film.arrays[name] for name in self.layers if name in film.arrays},
             stats=self._stats(film),
             scene_name=scene.name,

@@ -39,7 +39,7 @@ class PixelGrid:
 @dataclass
 class PixelColumns:
     """What the loop finds for n pixels: mean `color` (3, n), `coverage` (share of sub-rays that hit), and of
-    the nearest sub-ray `depth` (-1: none), `view_depth` (how far the hit is from the canvas along the view
+    the nearest sub-ray `depth` (-1: none), `view_depth` (how far the hit is from the eye along the view
     axis, infinite: none), `primitive` and `sub_ray`; `counts`: rays by kind."""
 
     color: Any
@@ -154,7 +154,7 @@ def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid) ->
         color=color * share,
         coverage=backend.Float(hits) * share,
         depth=dr.select(hits > 0, depth, -1),
-        view_depth=view_depth,
+        view_depth=canvas.distance + view_depth,
         primitive=nearest,
         sub_ray=nearest_sub_ray,
         counts=counts,

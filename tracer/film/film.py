@@ -68,5 +68,5 @@ class Film:
 
     @property
     def z(self) -> np.ndarray:
-        """(h, w), from the canvas along the view axis, infinite where blank."""
+        """(h, w), from the eye along the view axis, infinite where blank."""
         return self.layer("z")

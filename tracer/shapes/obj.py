@@ -1,28 +1,18 @@
 """Reads the geometry of a Wavefront OBJ file: `v`, `vn` and `f`, in the file's order.
 
-Own code, because the readers on offer either regroup faces or have no wheel for every Python version that this project
+Own code, because the readers on offer either regroup faces or have no wheel for every Python version that
+this project
 supports. Materials, groups, lines and texture coordinates are skipped.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from tracer.errors import SceneError
-
-
-@dataclass(frozen=True)
-class PolygonSoup:
-    """Faces as a file gives them. `vertices` (n, 3), `normals` (k, 3); `faces` and `face_normals`: for each face the
-    numbers of its corners and of their normals (-1: none)."""
-
-    vertices: np.ndarray
-    normals: np.ndarray
-    faces: list[list[int]]
-    face_normals: list[list[int]]
+from tracer.shapes.polygons import PolygonSoup, check_faces
 
 
 def read_obj(path: Path) -> PolygonSoup:
@@ -45,16 +35,18 @@ def read_obj(path: Path) -> PolygonSoup:
                 face_normals.append([corner[1] for corner in corners])
         except ValueError as error:
             raise SceneError(f"{path}, line {number}: {error}") from None
-    _check_range(path, faces, len(vertices), "vertex")
-    _check_range(path, face_normals, len(normals), "normal")
+    check_faces(path, faces, len(vertices), "vertex")
+    check_faces(path, face_normals, len(normals), "normal")
     shape = (-1, 3)
-    return PolygonSoup(np.array(vertices).reshape(shape), np.array(normals).reshape(shape), faces, face_normals)
+    return PolygonSoup(
+        np.array(vertices).reshape(shape), np.array(normals).reshape(shape), faces, face_normals
+    )
 
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
     """(line number, words) of every line with content; a backslash at the end continues a line."""
     try:
-        text = path.read_bytes().decode("utf-8", errors="replace")
+        text = path.read_bytes().decode("utf-8-sig", errors="replace")
     except OSError as error:
         raise SceneError(f"{path}: cannot be read ({error.strerror})") from None
     result, pending, first = [], "", 0
@@ -81,7 +73,8 @@ def _three_floats(words: list[str]) -> tuple[float, ...]:
 
 
 def _corner(word: str, vertices: int, normals: int) -> tuple[int, int]:
-    """Numbers (from 0) of vertex and normal of `v`, `v/vt`, `v//vn` or `v/vt/vn`; -1 where there is no normal."""
+    """Numbers (from 0) of vertex and normal of `v`, `v/vt`, `v//vn` or `v/vt/vn`; -1 where there is no
+    normal."""
     parts = word.split("/")
     try:
         vertex = int(parts[0])
@@ -98,9 +91,3 @@ def _index(number: int, so_far: int, what: str) -> int:
     if number == 0 or -number > so_far:
         raise ValueError(f"{what} {number} does not exist")
     return so_far + number
-
-
-def _check_range(path: Path, faces: list[list[int]], count: int, what: str) -> None:
-    for face in faces:
-        if max(face) >= count:
-            raise SceneError(f"{path}: a face names {what} {max(face) + 1}; the file has {count}")

@@ -42,7 +42,8 @@ class Sphere(ShapeRecord):
 def contact_margin(row: np.ndarray, epsilon: float) -> float:
     """Bound on the rounding of |o-c|^2 - r^2 for an origin on a surface that touches the sphere.
 
-    A position there is known to 8 eps (|c| + r) across its surface and to 4 times that along it, and the square
+    A position there is known to 8 eps (|c| + r) across its surface and to 4 times that along it, and the
+    square
     changes 2 r times as fast.
     """
     extent = float(np.abs(row[:3]).max() + row[3])

@@ -1,6 +1,7 @@
 """The triangles of a mesh shape: read, cut, placed and rounded (document, section 5.9).
 
-Vertices are rounded to single precision as read and once more after they were placed, so that every precision, every
+Vertices are rounded to single precision as read and once more after they were placed, so that every
+precision, every
 backend and Mitsuba see the same triangles.
 """
 
@@ -16,16 +17,21 @@ from tracer.errors import SceneError
 from tracer.placement import Placement
 from tracer.shapes.mesh import Mesh
 from tracer.shapes.obj import read_obj
+from tracer.shapes.ply import read_ply
+from tracer.shapes.polygons import PolygonSoup
 
-_CUBE_VERTICES = [(x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)]
-_CUBE_FACES = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
-_TETRAHEDRON_VERTICES = [(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]
-_TETRAHEDRON_FACES = [(0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)]
-
-BUILTIN_MESHES = {
-    "cube": (_CUBE_VERTICES, _CUBE_FACES),
-    "tetrahedron": (_TETRAHEDRON_VERTICES, _TETRAHEDRON_FACES),
+BUILTIN_MESHES: dict[str, tuple[list[tuple[int, int, int]], list[tuple[int, ...]]]] = {
+    "cube": (
+        [(x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)],
+        [(0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)],
+    ),
+    "tetrahedron": (
+        [(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)],
+        [(1, 3, 2), (0, 2, 3), (0, 3, 1), (0, 1, 2)],
+    ),
 }
+"""Wound outward. Faces of the cube: -x, +x, -y, +y, -z, +z; face k of the tetrahedron is opposite to corner
+k."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +39,8 @@ class MeshData:
     """A mesh before it is placed.
 
     `vertices` (n, 3) float32 values in float64; `triangles` (m, 3) vertex numbers; `faces` (m,) number of the face in
-    the file that each triangle was cut from; `normals` (m, 3, 3) at the corners, from the file, zero where it has none.
+    the file that each triangle was cut from; `normals` (m, 3, 3) at the corners, from the file, zero where
+    it has none.
     """
 
     vertices: np.ndarray
@@ -44,7 +51,8 @@ class MeshData:
 
 @dataclass(frozen=True)
 class PlacedMesh:
-    """Triangles in world space. `corners` (m, 3, 3), unit `normals` (m, 3; zero: degenerate), `faces` (m,), unit
+    """Triangles in world space. `corners` (m, 3, 3), unit `normals` (m, 3; zero: degenerate), `faces` (m,),
+    unit
     `corner_normals` (m, 3, 3) for smooth shading."""
 
     corners: np.ndarray
@@ -54,22 +62,23 @@ class PlacedMesh:
 
 
 def read_mesh(mesh: Mesh, path: Path | None, where: str) -> MeshData:
-    """The mesh that a record asks for; `path` is its resolved file, `where` names the shape in error texts."""
+    """The mesh that a record asks for; `path` is its resolved file, `where` names the shape in error
+    texts."""
     if mesh.builtin is not None:
         vertices, faces = BUILTIN_MESHES[mesh.builtin]
         return _cut(np.array(vertices, np.float64), faces)
     if path is None:
-        assert mesh.faces is not None
-        return _cut(np.array(mesh.vertices, np.float64), mesh.faces)
-    if path.suffix.lower() == ".ply":
-        data = _read_ply(path)
+        assert mesh.vertices is not None and mesh.faces is not None
+        data = _cut(np.array(mesh.vertices, np.float64), mesh.faces)
     else:
-        soup = read_obj(path)
-        data = _cut(soup.vertices, soup.faces, soup.normals, soup.face_normals)
+        soup = read_ply(path) if path.suffix.lower() == ".ply" else read_obj(path)
+        data = _cut(soup.vertices, soup.faces, soup)
     if len(data.triangles) == 0:
         raise SceneError(f"{where}.file: {path} has no faces; allowed: a mesh with one triangle at least")
     if not np.isfinite(data.vertices).all():
-        raise SceneError(f"{where}.file: {path} has a vertex that is not finite in single precision")
+        raise SceneError(
+            f"{where}: {path or 'vertices'} leaves the range of single precision, or is not finite"
+        )
     return data
 
 
@@ -90,55 +99,29 @@ def _corner_normals(data: MeshData, placement: Placement, vertices: np.ndarray) 
     for corner in range(3):
         np.add.at(sums, data.triangles[:, corner], weighted)
     computed = sums[data.triangles]
-    given = placement.normals(data.normals.reshape(-1, 3)).reshape(-1, 3, 3)
-    return _unit(np.where(np.any(given != 0, axis=2, keepdims=True), given, computed))
+    if not data.normals.any():
+        return _unit(computed)
+    return _unit(placement.normals(data.normals.reshape(-1, 3)).reshape(-1, 3, 3))
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
-    """Unit vectors along the last axis; zero stays zero. Scaled first: squares must neither vanish nor overflow."""
+    """Unit vectors along the last axis; zero stays zero. Scaled first: squares must neither vanish nor
+    overflow."""
     largest = np.abs(vectors).max(axis=-1, keepdims=True)
     scaled = vectors / np.where(largest > 0, largest, 1)
     length = np.linalg.norm(scaled, axis=-1, keepdims=True)
     return scaled / np.where(length > 0, length, 1)
 
 
-def _cut(
-    vertices: np.ndarray,
-    faces: Sequence[Sequence[int]],
-    normals: np.ndarray | None = None,
-    face_normals: Sequence[Sequence[int]] | None = None,
-) -> MeshData:
+def _cut(vertices: np.ndarray, faces: Sequence[Sequence[int]], soup: PolygonSoup | None = None) -> MeshData:
     """Cuts faces into fans of triangles, in order, and rounds the vertices to single precision."""
-    triangles, numbers, at = [], [], []
-    for number, face in enumerate(faces):
-        for k in range(1, len(face) - 1):
-            triangles.append((face[0], face[k], face[k + 1]))
-            at.append((0, k, k + 1))
-            numbers.append(number)
+    fans = [(number, k) for number, face in enumerate(faces) for k in range(1, len(face) - 1)]
+    triangles = [(faces[n][0], faces[n][k], faces[n][k + 1]) for n, k in fans]
     corner_normals = np.zeros((len(triangles), 3, 3))
-    if normals is not None and face_normals is not None and len(normals):
-        padded = np.vstack([normals, np.zeros(3)])  # number -1 finds the zero row
-        ids = [[face_normals[n][c] for c in corners] for n, corners in zip(numbers, at, strict=True)]
-        corner_normals = padded[np.array(ids).reshape(-1, 3)]
+    if soup is not None and soup.has_all_normals:
+        ids = [[soup.face_normals[n][corner] for corner in (0, k, k + 1)] for n, k in fans]
+        corner_normals = soup.normals[np.array(ids).reshape(-1, 3)]
     with np.errstate(over="ignore"):
         rounded = vertices.astype(np.float32).astype(np.float64)
-    return MeshData(rounded, np.array(triangles, np.int64).reshape(-1, 3), np.array(numbers), corner_normals)
-
-
-def _read_ply(path: Path) -> MeshData:
-    import trimesh
-
-    try:
-        mesh = trimesh.load(path, file_type="ply", process=False, maintain_order=True)
-    except Exception as error:
-        raise SceneError(f"{path}: cannot be read as PLY ({error})") from None
-    if not isinstance(mesh, trimesh.Trimesh):
-        return _cut(np.zeros((0, 3)), [])
-    vertices = np.asarray(mesh.vertices, np.float64)
-    triangles = np.asarray(mesh.faces, np.int64)
-    if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(vertices)):
-        raise SceneError(f"{path}: a face names vertex {triangles.max()}; the file has {len(vertices)}")
-    normals = mesh._cache.cache.get("vertex_normals")
-    corner_normals = np.zeros((len(triangles), 3, 3)) if normals is None else np.asarray(normals)[triangles]
-    rounded = vertices.astype(np.float32).astype(np.float64)
-    return MeshData(rounded, triangles, np.arange(len(triangles)), corner_normals)
+    numbers = np.array([number for number, _ in fans], np.int64)
+    return MeshData(rounded, np.array(triangles, np.int64).reshape(-1, 3), numbers, corner_normals)
