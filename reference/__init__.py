@@ -1,1 +1,1 @@
-"""What the tracer is judged by: the model in plain scalar Python, and the comparison with Mitsuba 3."""
+"""What the tracer is judged by: the model in plain scalar Python, and the table of tolerances."""

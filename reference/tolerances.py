@@ -2,8 +2,8 @@
 comes from.
 
 Units: `eps` is the unit roundoff, 2^-24 in single and 2^-53 in double precision; S is the largest
-|coordinate| of the
-scene, ray origins included; theta the angle between a ray and the normal of what it hits.
+|coordinate| of the scene, ray origins included; theta the angle between a ray and the normal of what it
+hits.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ class DepthOfField(Record):
     """The filter over the finished picture (document, section 8)."""
 
     focus: Real = Field(
-        description="depth (distance from the canvas along the ray) that is sharp; negative: off; 0 is refused"
+        description="depth (distance from the canvas along the ray) that is sharp; negative: off; 0: refused"
     )
     samples: SampleCount = Field(default=30, description="draws per pixel")
     depth_range: Positive | None = Field(

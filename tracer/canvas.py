@@ -121,8 +121,8 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 class DeviceCanvas:
     """A canvas in a kernel: width-1 numbers that kernels read from memory.
 
-    `center` K, `x`, `y`: steps of one pixel along X and Y, `forward`: dis f, `axis`: f, `distance`: dis, `half_width`,
-    `half_height` in pixels, `offset` delta.
+    `center` K, `x`, `y`: steps of one pixel along X and Y, `forward`: dis f, `axis`: f, `distance`: dis,
+    `half_width`, `half_height` in pixels, `offset` delta.
     """
 
     center: Any

@@ -21,7 +21,7 @@ from tracer.llvm import VARIABLE, LlvmLibrary, find_llvm
 from tracer.llvm_search import install_hint
 
 DISTRIBUTION = "whitted-tracer"
-_PACKAGES = ("drjit", "mitsuba", "numpy", "pydantic", "opencv-python-headless", "OpenEXR", "trimesh")
+_PACKAGES = ("drjit", "mitsuba", "numpy", "pydantic", "opencv-python-headless", "OpenEXR")
 _TRY_BACKENDS = """
 import json, sys
 import drjit as dr

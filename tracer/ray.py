@@ -105,8 +105,8 @@ def departure_word(primitive: Any, inside: Any) -> Any:
 
 
 def normalize(v: Any) -> Any:
-    """v / |v| by square root and division, each correctly rounded (`dr.normalize` uses an estimate on
-    LLVM)."""
+    """v / |v| by square root and division, each correctly rounded on every backend (`dr.normalize` may use
+    an estimate where fast math is on)."""
     return v * dr.rcp(dr.sqrt(dr.squared_norm(v)))
 
 

@@ -2,16 +2,11 @@
 doubt.
 
 A ray comes from open space and hits solid f at p, so p lies outside every other solid, however it was
-rounded. A
-ray that leaves f outwards can never meet f again; one that goes through f is inside of it until the line
-leaves f.
-Another solid g is met where the line enters it in front of p. The line certainly meets g when it meets g
-shrunk by
-the bound on rounding, and certainly misses g when it misses g grown by it. Where p itself lies within the
-bound of
-g, the grown g holds p; then g is missed when the line leaves the grown g at once. All other cases are
-doubtful and
-are left out; tests bound how many they may be.
+rounded. A ray that leaves f outwards can never meet f again; one that goes through f is inside of it until
+the line leaves f. Another solid g is met where the line enters it in front of p. The line certainly meets g
+when it meets g shrunk by the bound on rounding, and certainly misses g when it misses g grown by it. Where
+p itself lies within the bound of g, the grown g holds p; then g is missed when the line leaves the grown g
+at once. All other cases are doubtful and are left out; tests bound how many they may be.
 """
 
 from __future__ import annotations

@@ -20,8 +20,8 @@ Array = np.ndarray
 @dataclass(frozen=True)
 class Bounce:
     """First hits: `shape`, `primitive` (within the shape; -1: none), `p`, `outward`, `entering`; and what
-    the rays
-    that leave meet: `next_shape`, `next_primitive`, `t`; `blocked`: a light at `length` is hidden."""
+    the rays that leave meet: `next_shape`, `next_primitive`, `t`; `blocked`: a light at `length` is
+    hidden."""
 
     valid: Array
     shape: Array

@@ -1,8 +1,8 @@
 """Whole pictures: `tracer` against `reference.plain`, which another person wrote from the same document.
 
 In double precision no pixel is left out and every kind of ray is counted alike. In single precision the
-edges are:
-pixels whose double-precision color moves when the canvas moves by the rounding of single precision.
+edges are: pixels whose double-precision color moves when the canvas moves by the rounding of single
+precision.
 """
 
 from __future__ import annotations

@@ -92,8 +92,7 @@ def test_moved_scene_keeps_its_colors() -> None:
     """Moved by 2,000 units: the picture changes by less than the bound, except at edges, which are counted.
 
     Every coordinate is rounded to eps (S + 2000), so normals, directions to lights and cosines change by
-    that over
-    the smallest length in play, here the radius 1.5; see the table of tolerances.
+    that over the smallest length in play, here the radius 1.5; see the table of tolerances.
     """
     here = tracer.render(tracer.load(solid_room(0.0)), precision="single")
     there = tracer.render(tracer.load(solid_room(2000.0)), precision="single")

@@ -1,8 +1,8 @@
 """Two quads A and B that share an edge at any angle, and what is true of rays that start on one of them.
 
 In the plane across the edge a ray that leaves A at distance x from the edge, at the angle phi from A's own
-direction,
-meets B, which stands at the angle w on that side, exactly when w < pi and phi > w: whatever x is, even 0.
+direction, meets B, which stands at the angle w on that side, exactly when w < pi and phi > w: whatever x
+is, even 0.
 """
 
 from __future__ import annotations
@@ -66,8 +66,7 @@ def try_wedge(degrees: float, trials: int, rays: int, offset: float, precision: 
     """Rays from both faces, both sides and through, 1e-7 to 1e-1 of the size from the edge.
 
     The truth is that of the wedge before its vertices were rounded to single precision, so distances agree
-    to single
-    precision whatever that of the rays is.
+    to single precision whatever that of the rays is.
     """
     tally = Tally()
     for trial in range(trials):

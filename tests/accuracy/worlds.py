@@ -1,8 +1,7 @@
 """Small seeded scenes for the comparison of `tracer` with `reference.plain`: one a feature, and random ones.
 
 Every scene is a dict as in a scene file. Coordinates are odd numbers on purpose: pixel centers must not
-fall on
-edges by symmetry, where either answer is right. Files stand in one folder, made by `write_files`.
+fall on edges by symmetry, where either answer is right. Files stand in one folder, made by `write_files`.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""The bounding volume hierarchy over all triangles of a scene, and its brute-force twin."""
+"""The bounding volume hierarchy over all triangles of a scene, and what happens close to a ray's start."""

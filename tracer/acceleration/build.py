@@ -1,6 +1,6 @@
 """Builds the bounding volume hierarchy: triangles sorted along a Morton curve under a complete binary tree.
 
-The tree needs no links. Node 1 is the root (the bounding box of the document's section 5.9), the children of
+The tree needs no links. Node 1 is the root (the bounding box of the document's section 5), the children of
 node i are 2i and 2i+1, and the last `leaf_count` nodes are the leaves, two triangle slots each. Lauterbach et
 al., Fast BVH Construction on GPUs, 2009, for the order; everything here is vectorized NumPy.
 """

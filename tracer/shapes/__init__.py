@@ -1,4 +1,4 @@
-"""The shapes: one file a kind. A new kind is a new file and one line in `SHAPE_KINDS`."""
+"""The shapes: one file a kind, listed in `SHAPE_KINDS`; docs/architecture.md says how to add one."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """Reads the geometry of a Wavefront OBJ file: `v`, `vn` and `f`, in the file's order.
 
 Own code, because the readers on offer either regroup faces or have no wheel for every Python version that
-this project
-supports. Materials, groups, lines and texture coordinates are skipped.
+this project supports. Materials, groups, lines and texture coordinates are skipped.
 """
 
 from __future__ import annotations

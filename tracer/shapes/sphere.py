@@ -43,8 +43,7 @@ def contact_margin(row: np.ndarray, epsilon: float) -> float:
     """Bound on the rounding of |o-c|^2 - r^2 for an origin on a surface that touches the sphere.
 
     A position there is known to 8 eps (|c| + r) across its surface and to 4 times that along it, and the
-    square
-    changes 2 r times as fast.
+    square changes 2 r times as fast.
     """
     extent = float(np.abs(row[:3]).max() + row[3])
     return 64 * epsilon * float(row[3]) * extent
@@ -95,8 +94,8 @@ class SphereSlot:
 
     def _crossed(self, segment: Segment) -> tuple[Any, Any, Any]:
         """Masks: the near surface is crossed on the way (if the ray starts outside), the far one is, and
-        the ray
-        starts outside. A light that lies on the sphere within rounding has not crossed the surface it lies on."""
+        the ray starts outside. A light that lies on the sphere within rounding has not crossed the surface
+        it lies on."""
         b, discriminant, outside = self._solve(segment.ray)
         light = dr.squared_norm(segment.light - self.center) - self.radius * self.radius
         past_middle = b < segment.length

@@ -1,8 +1,7 @@
-"""The triangles of a mesh shape: read, cut, placed and rounded (document, section 5.9).
+"""The triangles of a mesh shape: read, cut, placed and rounded (document, section 5).
 
 Vertices are rounded to single precision as read and once more after they were placed, so that every
-precision, every
-backend and Mitsuba see the same triangles.
+precision, every backend and Mitsuba see the same triangles.
 """
 
 from __future__ import annotations
@@ -38,9 +37,9 @@ k."""
 class MeshData:
     """A mesh before it is placed.
 
-    `vertices` (n, 3) float32 values in float64; `triangles` (m, 3) vertex numbers; `faces` (m,) number of the face in
-    the file that each triangle was cut from; `normals` (m, 3, 3) at the corners, from the file, zero where
-    it has none.
+    `vertices` (n, 3) float32 values in float64; `triangles` (m, 3) vertex numbers; `faces` (m,) number of
+    the face in the file that each triangle was cut from; `normals` (m, 3, 3) at the corners, from the file,
+    zero where it has none.
     """
 
     vertices: np.ndarray
@@ -52,8 +51,7 @@ class MeshData:
 @dataclass(frozen=True)
 class PlacedMesh:
     """Triangles in world space. `corners` (m, 3, 3), unit `normals` (m, 3; zero: degenerate), `faces` (m,),
-    unit
-    `corner_normals` (m, 3, 3) for smooth shading."""
+    unit `corner_normals` (m, 3, 3) for smooth shading."""
 
     corners: np.ndarray
     normals: np.ndarray
@@ -76,9 +74,7 @@ def read_mesh(mesh: Mesh, path: Path | None, where: str) -> MeshData:
     if len(data.triangles) == 0:
         raise SceneError(f"{where}.file: {path} has no faces; allowed: a mesh with one triangle at least")
     if not np.isfinite(data.vertices).all():
-        raise SceneError(
-            f"{where}: {path or 'vertices'} leaves the range of single precision, or is not finite"
-        )
+        raise SceneError(f"{where}: a vertex is not finite or leaves the range of single precision")
     return data
 
 

@@ -1,4 +1,4 @@
-"""The textures: one file a kind. A new kind is a new file and one line in `TEXTURE_KINDS`."""
+"""The textures: one file a kind, listed in `TEXTURE_KINDS`; docs/architecture.md says how to add one."""
 
 from __future__ import annotations
 

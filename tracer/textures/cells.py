@@ -1,4 +1,4 @@
-"""From a coordinate to the number of a cell (document, sections 3.3 and 6).
+"""From a coordinate to the number of a cell (document, section 6).
 
 F(q) = floor(q + eps): the small value puts a surface that lies exactly on a border into one cell all over. It
 must outweigh the rounding of the point, so it grows with the point's largest coordinate in single precision.
