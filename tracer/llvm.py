@@ -67,16 +67,23 @@ def select_llvm() -> None:
     """Points Dr.Jit to the library of `find_llvm`; to be called before the first import of `drjit`.
 
     Never raises, since CUDA and everything that renders nothing work without LLVM. Where no library is
-    usable, it imports Dr.Jit with its warnings silenced: `ensure_llvm` says the same in one sentence when it
-    matters.
+    usable, it imports Dr.Jit without one and with its warnings silenced (a library that is too old must not
+    even be started): `ensure_llvm` says the same in one sentence when it matters.
     """
     if "drjit" in sys.modules:
         return
     try:
         os.environ[VARIABLE] = str(find_llvm().path)
     except MachineError:
-        with captured_stderr():
-            importlib.import_module("drjit")
+        chosen = os.environ.get(VARIABLE)
+        os.environ[VARIABLE] = "no usable LLVM"
+        try:
+            with captured_stderr():
+                importlib.import_module("drjit")
+        finally:
+            del os.environ[VARIABLE]
+            if chosen is not None:
+                os.environ[VARIABLE] = chosen
 
 
 def ensure_llvm() -> LlvmLibrary:

@@ -35,7 +35,7 @@ class Settings:
 
     def checked(self) -> Settings:
         """The settings with AOV names spelled out; raises `UsageError`."""
-        aovs = tuple(self.aovs)
+        aovs = (self.aovs,) if isinstance(self.aovs, str) else tuple(self.aovs)
         known = ["depth", *LAYERS]
         if "all" in aovs:
             aovs = tuple(known)

@@ -178,9 +178,8 @@ def _primary(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, sub_ra
 def primary_ray(backend: Backend, canvas: DeviceCanvas, pixels: PixelGrid, sub_ray: Any) -> tuple[Any, Any]:
     """Origin and direction of a sub-ray (document, section 7)."""
     n, number = backend.Float(pixels.n), backend.Float(sub_ray)
-    b = dr.floor(
-        (number + 0.5) / n
-    )  # exact: at most 64 x 64 sub-rays; a whole division costs 20 times as much
+    # Exact for at most 64 x 64 sub-rays; a division of whole numbers costs 20 times as much.
+    b = dr.floor((number + 0.5) / n)
     a = number - b * n
     column = backend.Float(pixels.column) + (a + canvas.offset) / n
     row = backend.Float(pixels.row) + (b + canvas.offset) / n
