@@ -28,7 +28,7 @@ class Film:
         """Adds the finished rows of a band; each array holds its pixels in order, components last."""
         x0, y0, x1, y1 = self.rectangle
         for name, values in layers.items():
-            rows = values.reshape(band.height, band.width, -1)
+            rows: np.ndarray = values.reshape(band.height, band.width, -1)
             if rows.shape[2] == 1:
                 rows = rows[..., 0]
             if band.height == y1 - y0:

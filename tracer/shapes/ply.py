@@ -162,7 +162,7 @@ def _soup(path: Path, values: dict[str, dict[str, Any]]) -> PolygonSoup:
     """The polygons from the columns of the elements `vertex` and `face`."""
     vertex, face = values["vertex"], values.get("face", {})
     vertices = np.column_stack([vertex[name] for name in "xyz"]).astype(np.float64)
-    normals = np.zeros((0, 3))
+    normals: np.ndarray = np.zeros((0, 3))
     if all(name in vertex for name in ("nx", "ny", "nz")):
         normals = np.column_stack([vertex[name] for name in ("nx", "ny", "nz")]).astype(np.float64)
     key = next((name for name in _FACE_LISTS if name in face), None)
