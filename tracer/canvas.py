@@ -80,15 +80,6 @@ class Canvas:
             self, width=width, height=height, pixel_size=self.pixel_size / ratio, scale=self.scale * ratio
         )
 
-    def offsets(self, column: np.ndarray, row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Offsets from K in scene units of points given in pixels from the top-left corner."""
-        return (column - self.width / 2) * self.pixel_size, (row - self.height / 2) * self.pixel_size
-
-    def eye_to_canvas(self, column: np.ndarray, row: np.ndarray) -> np.ndarray:
-        """|P - e| of points P of the canvas, given in pixels from the top-left corner."""
-        x, y = self.offsets(column, row)
-        return np.sqrt(self.distance**2 + x * x + y * y)
-
 
 def _canvas_pose(camera: Camera) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
     """The document's camera: start pose, rotated about K by x_rotate then y_rotate, moved to its position."""
