@@ -6,6 +6,9 @@ Turk, The PLY Polygon File Format, 1994.
 
 from __future__ import annotations
 
+import re
+import struct
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,34 +16,25 @@ from typing import Any
 import numpy as np
 
 from tracer.errors import SceneError
+from tracer.messages import LONGEST_SHOWN
 from tracer.shapes.polygons import PolygonSoup, check_faces
 
-_TYPES = {
-    **dict.fromkeys(("char", "int8"), "i1"),
-    **dict.fromkeys(("uchar", "uint8"), "u1"),
-    **dict.fromkeys(("short", "int16"), "i2"),
-    **dict.fromkeys(("ushort", "uint16"), "u2"),
-    **dict.fromkeys(("int", "int32"), "i4"),
-    **dict.fromkeys(("uint", "uint32"), "u4"),
-    **dict.fromkeys(("float", "float32"), "f4"),
-    **dict.fromkeys(("double", "float64"), "f8"),
+_TYPES = {  # the old and the new names of the types of numbers, as `struct` and NumPy write them
+    **dict(zip("char uchar short ushort int uint float double".split(), "bBhHiIfd", strict=True)),
+    **dict(zip("int8 uint8 int16 uint16 int32 uint32 float32 float64".split(), "bBhHiIfd", strict=True)),
 }
+_WIDTHS = {kind: struct.calcsize(f"={kind}") for kind in _TYPES.values()}
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _FACE_LISTS = ("vertex_indices", "vertex_index")
 
 
 @dataclass
 class _Element:
-    """One element of the header: its properties as (name, type, type of the list's length or None)."""
+    """One element of the header: its properties, name to (type, type of the list's length or None)."""
 
     name: str
     count: int
-    properties: list[tuple[str, str, str | None]] = field(default_factory=list)
-
-    @property
-    def has_lists(self) -> bool:
-        """Whether entries differ in length."""
-        return any(length is not None for _, _, length in self.properties)
+    properties: dict[str, tuple[str, str | None]] = field(default_factory=dict)
 
 
 def read_ply(path: Path) -> PolygonSoup:
@@ -51,125 +45,164 @@ def read_ply(path: Path) -> PolygonSoup:
         raise SceneError(f"{path}: cannot be read ({error.strerror})") from None
     try:
         order, elements, body = _header(data)
-        reader: _Reader = _AsciiReader(body) if not order else _BinaryReader(body, order)
+        reader = _Reader(body, order)
         values = {element.name: reader.read(element) for element in elements}
-        return _soup(path, values)
-    except (ValueError, KeyError, IndexError, OverflowError) as error:
+        vertices, normals = _vertices(values["vertex"])
+        faces = _faces(values.get("face", {}))
+    except (ValueError, KeyError) as error:
         raise SceneError(f"{path}: is damaged or no PLY file ({error})") from None
+    check_faces(path, faces, len(vertices), "vertex")
+    face_normals = faces if len(normals) else [[-1] * len(polygon) for polygon in faces]
+    return PolygonSoup(vertices, normals, faces, face_normals)
+
+
+# ---- Header ------------------------------------------------------------------------------------
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
     """Byte order ("" for ascii), elements, and what follows the header."""
-    head, mark, rest = data.partition(b"end_header")
-    if not data.startswith(b"ply") or not mark:
+    start = re.match(rb"ply[ \t]*(\r\n|\n|\r)", data)
+    newline = b"\r" if start and start[1] == b"\r" else b"\n"
+    end = re.search(newline + rb"end_header[ \t\r]*?" + newline, data)
+    if start is None or end is None:
         raise ValueError("it has no PLY header")
-    body = rest.partition(b"\n")[2]
-    form, elements = None, list[_Element]()
-    for line in head.decode("ascii", errors="replace").splitlines():
+    form, elements = "missing", list[_Element]()
+    for number, line in enumerate(data[: end.start()].decode("ascii", errors="replace").splitlines(), 1):
         words = line.split()
-        if words[:1] == ["format"]:
-            form = words[1]
-        elif words[:1] == ["element"]:
-            elements.append(_Element(words[1], int(words[2])))
-        elif words[:2] == ["property", "list"]:
-            elements[-1].properties.append((words[4], _TYPES[words[3]], _TYPES[words[2]]))
-        elif words[:1] == ["property"]:
-            elements[-1].properties.append((words[2], _TYPES[words[1]], None))
+        try:
+            if words[:1] == ["format"]:
+                form = words[1]
+            elif words[:1] == ["element"]:
+                elements.append(_element(words, elements))
+            elif words[:1] == ["property"]:
+                _add_property(words, elements[-1])
+        except (ValueError, KeyError, IndexError):
+            raise ValueError(f"line {number} of its header is `{line.strip()[:LONGEST_SHOWN]}`") from None
     if form not in _ORDERS:
-        raise ValueError(f"its format is {form}")
-    if any(element.count < 0 for element in elements):
-        raise ValueError("an element has a negative count")
-    return _ORDERS[form], elements, body
+        raise ValueError(f"its format is {form[:LONGEST_SHOWN]}")
+    return _ORDERS[form], elements, data[end.end() :]
+
+
+def _element(words: list[str], others: list[_Element]) -> _Element:
+    """`element NAME COUNT`; ValueError where that is wrong or said before."""
+    _, name, count = words
+    if int(count) < 0 or any(other.name == name for other in others):
+        raise ValueError
+    return _Element(name, int(count))
+
+
+def _add_property(words: list[str], element: _Element) -> None:
+    """`property TYPE NAME` or `property list TYPE TYPE NAME`; ValueError or KeyError where that is wrong."""
+    *kinds, name = words[1:]
+    if name in element.properties:
+        raise ValueError
+    if kinds[:1] == ["list"]:
+        _, length, kind = kinds
+        element.properties[name] = _TYPES[kind], _TYPES[length]
+    else:
+        (kind,) = kinds
+        element.properties[name] = _TYPES[kind], None
+
+
+# ---- Body --------------------------------------------------------------------------------------
 
 
 class _Reader:
-    """Reads one element after the other: a column per property, for lists a Python list of arrays."""
+    """Reads one element after the other from words (order "", line ends are spaces like others) or bytes."""
+
+    def __init__(self, body: bytes, order: str) -> None:
+        self._stream: Any = body if order else _numbers(body)
+        self._widths = _WIDTHS if order else dict.fromkeys(_WIDTHS, 1)
+        self._order, self._at = order, 0
 
     def read(self, element: _Element) -> dict[str, Any]:
-        """The columns of the next element."""
-        self.check_size(element)
-        if not element.has_lists:
-            return self.read_table(element)
-        columns: dict[str, list[Any]] = {name: [] for name, _, _ in element.properties}
+        """A column per property; for lists (all numbers in a row, lengths)."""
+        kinds = element.properties
+        smallest = sum(self._widths[length or kind] for kind, length in kinds.values())
+        if element.count * smallest > len(self._stream) - self._at:
+            raise ValueError(f"it ends before its {element.count} entries of `{element.name}`")
+        if not any(length_kind for _, length_kind in kinds.values()):
+            return self._table(element.count, {name: kind for name, (kind, _) in kinds.items()})
+        columns = [(list[float](), list[int](), *kind) for kind in kinds.values()]
         for _ in range(element.count):
-            for name, kind, length_kind in element.properties:
-                if length_kind is None:
-                    columns[name].append(self.take(kind, 1)[0])
-                else:
-                    columns[name].append(self.take(kind, int(self.take(length_kind, 1)[0])))
-        return columns
+            for numbers, lengths, kind, length_kind in columns:
+                length = self._length(length_kind) if length_kind else 1
+                numbers.extend(self._take(kind, length))
+                lengths.append(length)
+        pairs = zip(kinds, columns, strict=True)
+        return {name: column[:2] if column[3] else column[0] for name, column in pairs}
 
-    def check_size(self, element: _Element) -> None:
-        """Raises ValueError where the file is too short for what the header promises."""
-        raise NotImplementedError
+    def _length(self, kind: str) -> int:
+        (number,) = self._take(kind, 1)
+        if not number >= 0 or number % 1 != 0:
+            raise ValueError(f"a list has the length {number}")
+        return int(number)
 
-    def read_table(self, element: _Element) -> dict[str, Any]:
-        """The columns of an element without lists."""
-        raise NotImplementedError
-
-    def take(self, kind: str, count: int) -> np.ndarray:
-        """The next `count` numbers of a type."""
-        raise NotImplementedError
-
-
-class _AsciiReader(_Reader):
-    def __init__(self, body: bytes) -> None:
-        self._words = body.split()
-        self._at = 0
-
-    def check_size(self, element: _Element) -> None:
-        if element.count * len(element.properties) > len(self._words) - self._at:
-            raise ValueError(f"it ends before its {element.count} entries of `{element.name}`")
-
-    def read_table(self, element: _Element) -> dict[str, Any]:
-        width = len(element.properties)
-        table = self.take("f8", element.count * width).reshape(element.count, width)
-        return {name: table[:, k] for k, (name, _, _) in enumerate(element.properties)}
-
-    def take(self, kind: str, count: int) -> np.ndarray:
-        words = self._words[self._at : self._at + count]
-        if count < 0 or len(words) < count:
+    def _take(self, kind: str, count: int) -> Sequence[float]:
+        """The next `count` numbers of a type; ValueError where there are fewer."""
+        start, size = self._at, count * self._widths[kind]
+        if size > len(self._stream) - start:
             raise ValueError("it ends too early")
-        self._at += count
-        return np.array(words, "f8")
+        self._at += size
+        if self._order:
+            return struct.unpack_from(f"{self._order}{count}{kind}", self._stream, start)
+        numbers: list[float] = self._stream[start : self._at]
+        return numbers
 
-
-class _BinaryReader(_Reader):
-    def __init__(self, body: bytes, order: str) -> None:
-        self._body, self._order, self._at = body, order, 0
-
-    def check_size(self, element: _Element) -> None:
-        smallest = sum(int(np.dtype(length or kind).itemsize) for _, kind, length in element.properties)
-        if element.count * smallest > len(self._body) - self._at:
-            raise ValueError(f"it ends before its {element.count} entries of `{element.name}`")
-
-    def read_table(self, element: _Element) -> dict[str, Any]:
-        layout = np.dtype([(name, self._order + kind) for name, kind, _ in element.properties])
-        table = np.frombuffer(self._body, layout, element.count, self._at)
-        self._at += layout.itemsize * element.count
-        return {name: table[name].astype(np.float64) for name, _, _ in element.properties}
-
-    def take(self, kind: str, count: int) -> np.ndarray:
-        layout = np.dtype(self._order + kind)
-        if count < 0 or layout.itemsize * count > len(self._body) - self._at:
-            raise ValueError("it ends too early")
-        values = np.frombuffer(self._body, layout, count, self._at)
+    def _table(self, count: int, kinds: dict[str, str]) -> dict[str, Any]:
+        """The columns of `count` entries without lists, whose place in the file was checked."""
+        if not self._order:
+            numbers = self._take("d", count * len(kinds))
+            return {name: numbers[k :: len(kinds)] for k, name in enumerate(kinds)}
+        layout = np.dtype([(name, self._order + kind) for name, kind in kinds.items()])
+        rows: Any = np.frombuffer(self._stream, layout, count, self._at) if kinds else None
         self._at += layout.itemsize * count
-        return values
+        return {name: rows[name] for name in kinds}
 
 
-def _soup(path: Path, values: dict[str, dict[str, Any]]) -> PolygonSoup:
-    """The polygons from the columns of the elements `vertex` and `face`."""
-    vertex, face = values["vertex"], values.get("face", {})
-    vertices = np.column_stack([vertex[name] for name in "xyz"]).astype(np.float64)
-    normals: np.ndarray = np.zeros((0, 3))
-    if all(name in vertex for name in ("nx", "ny", "nz")):
-        normals = np.column_stack([vertex[name] for name in ("nx", "ny", "nz")]).astype(np.float64)
-    key = next((name for name in _FACE_LISTS if name in face), None)
-    faces = [polygon.astype(np.int64).tolist() for polygon in face[key]] if key else []
-    for number, polygon in enumerate(faces):
-        if len(polygon) < 3:
-            raise SceneError(f"{path}: face {number} has fewer than three corners")
-    check_faces(path, faces, len(vertices), "vertex")
-    face_normals = faces if len(normals) else [[-1] * len(polygon) for polygon in faces]
-    return PolygonSoup(vertices, normals, faces, face_normals)
+def _numbers(body: bytes) -> list[float]:
+    try:
+        return list(map(float, body.split()))
+    except ValueError as error:
+        wrong = str(error).rpartition(": b")[2]
+        raise ValueError(f"{wrong[:LONGEST_SHOWN]} is not a number") from None
+
+
+# ---- Geometry ----------------------------------------------------------------------------------
+
+
+def _vertices(columns: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and normals (n, 3); no normals (0, 3) unless all three components are there."""
+    vertices = _vectors(columns, ("x", "y", "z"))
+    with np.errstate(over="ignore"):
+        sound = np.isfinite(vertices.astype(np.float32)).all(axis=1)
+    if not sound.all():
+        what = f"vertex {np.argmin(sound)}, counted from 0,"
+        raise ValueError(f"{what} is not finite or leaves the range of single precision")
+    if not {"nx", "ny", "nz"} <= columns.keys():
+        return vertices, np.zeros((0, 3))
+    normals = _vectors(columns, ("nx", "ny", "nz"))
+    sound = np.isfinite(normals).all(axis=1)
+    if not sound.all():
+        raise ValueError(f"the normal of vertex {np.argmin(sound)}, counted from 0, is not finite")
+    return vertices, normals
+
+
+def _vectors(columns: dict[str, Any], names: tuple[str, str, str]) -> np.ndarray:
+    for name in names:
+        if isinstance(columns.get(name, ()), tuple):
+            raise ValueError(f"its vertices have no number `{name}`")
+    return np.column_stack([np.asarray(columns[name], np.float64) for name in names])
+
+
+def _faces(columns: dict[str, Any]) -> list[list[int]]:
+    """The vertex numbers of each face, not yet checked against the number of vertices."""
+    key = next((name for name in _FACE_LISTS if isinstance(columns.get(name), tuple)), None)
+    numbers, lengths = columns[key] if key else ([], [])
+    if min(lengths, default=3) < 3:
+        number = next(number for number, length in enumerate(lengths) if length < 3)
+        raise ValueError(f"face {number} has fewer than three corners")
+    if not all(map(float.is_integer, map(float, numbers))):
+        raise ValueError("a face names a vertex that is no whole number")
+    corners, ends = list(map(int, numbers)), np.cumsum(lengths, dtype=np.int64).tolist()
+    return [corners[end - length : end] for end, length in zip(ends, lengths, strict=True)]

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -38,8 +40,8 @@ class MeshData:
     """A mesh before it is placed.
 
     `vertices` (n, 3) float32 values in float64; `triangles` (m, 3) vertex numbers; `faces` (m,) number of
-    the face in the file that each triangle was cut from; `normals` (m, 3, 3) at the corners, from the file,
-    zero where it has none.
+    the face in the file that each triangle was cut from; `normals` (m, 3, 3) at the corners, of any length,
+    from the file, or (0, 3, 3) unless it has one for every corner of every face.
     """
 
     vertices: np.ndarray
@@ -79,45 +81,108 @@ def read_mesh(mesh: Mesh, path: Path | None, where: str) -> MeshData:
 
 
 def place_mesh(data: MeshData, placement: Placement) -> PlacedMesh:
-    """The mesh in world space, rounded to single precision."""
-    with np.errstate(over="ignore"):
+    """The mesh in world space, rounded to single precision; infinite where it leaves that range."""
+    with np.errstate(over="ignore", invalid="ignore"):
         vertices = placement.points(data.vertices).astype(np.float32).astype(np.float64)
-    corners = vertices[data.triangles]
-    normals = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    return PlacedMesh(corners, normals, data.faces, _corner_normals(data, placement, vertices))
+        corners = vertices[data.triangles]
+        areas = accurate_areas(corners)
+    if len(data.normals):
+        # Unit length first: a length from the file times a scale could leave the range of double precision.
+        corner_normals = placement.normals(_unit(data.normals).reshape(-1, 3)).reshape(-1, 3, 3)
+    else:
+        corner_normals = _area_weighted(data.triangles, areas, len(vertices))
+    return PlacedMesh(corners, _unit(areas), data.faces, _unit(corner_normals))
 
 
-def _corner_normals(data: MeshData, placement: Placement, vertices: np.ndarray) -> np.ndarray:
-    """The file's normals where present, else the area-weighted mean of the faces around each vertex."""
-    corners = vertices[data.triangles]
-    weighted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sums = np.zeros_like(vertices)
+def accurate_areas(corners: np.ndarray) -> np.ndarray:
+    """(b - a) x (c - a) of triangles (m, 3, 3) whose corners are single precision numbers; (m, 3).
+
+    The largest component is right to 2 ulp, and zero only for degenerate triangles: slivers lose nothing to
+    cancellation. Each factor is a sum of two doubles (Dekker, A Floating-Point Technique for Extending the
+    Available Precision, 1971); the few triangles for which that is too little are computed with fractions.
+    Products of single precision numbers neither vanish nor overflow in double precision.
+    """
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    (u, u_low), (v, v_low) = _exact_sum(b, -a), _exact_sum(c, -a)
+    inexact = (u_low != 0).any(axis=1) | (v_low != 0).any(axis=1)
+    areas, sizes = np.empty_like(a), np.empty_like(a)
+    for axis in range(3):
+        y, z = (axis + 1) % 3, (axis + 2) % 3
+        p, p_low = _product(u[:, y], u_low[:, y], v[:, z], v_low[:, z])
+        q, q_low = _product(u[:, z], u_low[:, z], v[:, y], v_low[:, y])
+        difference, low = _exact_sum(p, -q)
+        areas[:, axis] = difference + (low + (p_low - q_low))
+        sizes[:, axis] = np.where(inexact | (p_low != 0) | (q_low != 0), np.abs(p) + np.abs(q), 0)
+    # But for the last rounding a component is wrong by 2^-102 (|p| + |q|) at most: is that below one ulp?
+    hard = 2.0**-102 * sizes.max(axis=1) > 2.0**-53 * np.abs(areas).max(axis=1)
+    for number in np.flatnonzero(hard & np.isfinite(sizes).all(axis=1)):
+        areas[number] = _area_by_fractions(corners[number])
+    return areas
+
+
+def _exact_sum(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """x + y as the rounded sum and its rounding error (Knuth)."""
+    total = x + y
+    part = total - x
+    return total, (x - (total - part)) + (y - part)
+
+
+def _product(
+    x: np.ndarray, x_low: np.ndarray, y: np.ndarray, y_low: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(x + x_low)(y + y_low) as a sum of two doubles, but for x_low y_low and roundings of that size."""
+    product = x * y
+    x1, y1 = _upper_half(x), _upper_half(y)
+    x2, y2 = x - x1, y - y1
+    error = x2 * y2 - (((product - x1 * y1) - x2 * y1) - x1 * y2)
+    return product, error + (x * y_low + x_low * y)
+
+
+def _upper_half(x: np.ndarray) -> np.ndarray:
+    """x rounded to 26 bits, so that products of halves are exact (Veltkamp)."""
+    scaled = x * (2.0**27 + 1)
+    return scaled - (scaled - x)
+
+
+def _area_by_fractions(corners: np.ndarray) -> list[float]:
+    a, b, c = ([Fraction(float(x)) for x in corner] for corner in corners)
+    u, v = ([x - y for x, y in zip(end, a, strict=True)] for end in (b, c))
+    return [float(u[i - 2] * v[i - 1] - u[i - 1] * v[i - 2]) for i in range(3)]
+
+
+def _area_weighted(triangles: np.ndarray, areas: np.ndarray, vertices: int) -> np.ndarray:
+    """(m, 3, 3): at each corner the sum of the areas of all triangles that name its vertex."""
+    sums = np.zeros((vertices, 3))
     for corner in range(3):
-        np.add.at(sums, data.triangles[:, corner], weighted)
-    computed = sums[data.triangles]
-    if not data.normals.any():
-        return _unit(computed)
-    return _unit(placement.normals(data.normals.reshape(-1, 3)).reshape(-1, 3, 3))
+        np.add.at(sums, triangles[:, corner], areas)
+    return sums[triangles]
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
-    """Unit vectors along the last axis; zero stays zero. Scaled first: squares must neither vanish nor
-    overflow."""
-    largest = np.abs(vectors).max(axis=-1, keepdims=True)
-    scaled = vectors / np.where(largest > 0, largest, 1)
+    """Unit vectors along the last axis; zero stays zero. Scaled first, by a power of two: squares must
+    neither vanish nor overflow."""
+    exponents = np.frexp(np.abs(vectors).max(axis=-1, keepdims=True))[1]
+    scaled = np.ldexp(vectors, -exponents)
     length = np.linalg.norm(scaled, axis=-1, keepdims=True)
     return scaled / np.where(length > 0, length, 1)
 
 
 def _cut(vertices: np.ndarray, faces: Sequence[Sequence[int]], soup: PolygonSoup | None = None) -> MeshData:
     """Cuts faces into fans of triangles, in order, and rounds the vertices to single precision."""
-    fans = [(number, k) for number, face in enumerate(faces) for k in range(1, len(face) - 1)]
-    triangles = [(faces[n][0], faces[n][k], faces[n][k + 1]) for n, k in fans]
-    corner_normals = np.zeros((len(triangles), 3, 3))
+    sizes = np.fromiter(map(len, faces), np.int64, len(faces))
+    fans = sizes - 2  # triangles of each face
+    numbers = np.repeat(np.arange(len(faces)), fans)
+    first = np.repeat(np.cumsum(sizes) - sizes, fans)  # place of the face's first corner among all corners
+    step = np.arange(len(numbers)) - np.repeat(np.cumsum(fans) - fans, fans)
+    places = np.stack([first, first + step + 1, first + step + 2], axis=1)
+    triangles = _flat(faces)[places]
+    corner_normals = np.zeros((0, 3, 3))
     if soup is not None and soup.has_all_normals:
-        ids = [[soup.face_normals[n][corner] for corner in (0, k, k + 1)] for n, k in fans]
-        corner_normals = soup.normals[np.array(ids).reshape(-1, 3)]
+        corner_normals = soup.normals[_flat(soup.face_normals)[places]]
     with np.errstate(over="ignore"):
         rounded = vertices.astype(np.float32).astype(np.float64)
-    numbers = np.array([number for number, _ in fans], np.int64)
-    return MeshData(rounded, np.array(triangles, np.int64).reshape(-1, 3), numbers, corner_normals)
+    return MeshData(rounded, triangles, numbers, corner_normals)
+
+
+def _flat(lists: Sequence[Sequence[int]]) -> np.ndarray:
+    return np.fromiter(chain.from_iterable(lists), np.int64)
