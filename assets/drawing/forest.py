@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from drawing.sheet import Outline, Sheet, ellipse, path
 
 WIDTH, HEIGHT = 640, 640
-HILLS = ("#eef0d8", "#dbe7cb", "#c3d9c0")
+HILLS = ("#f4ecc9", "#d6e6bf", "#b3d6c3")
 PINE, SPRUCE, FERN, MOSS = "#2f6657", "#3f7d66", "#6fa37d", "#9dbd7a"
 OCHRE, RUST, ROSE = "#e6ae55", "#cf7146", "#d98f7c"
 WOOD, BARK, BIRCH, INK, CREAM = "#7a5543", "#5b4036", "#f8f4e8", "#4c4540", "#fff7e6"
@@ -109,7 +109,7 @@ FOREST: tuple[tuple[Piece, ...], ...] = (
      ("oak", 285, 1.05, FERN), ("leafy", 402, 0.86, SPRUCE), ("fir", 476, 0.82, SPRUCE),
      ("bush", 528, 0.7, FERN), ("oak", 604, 0.8, OCHRE)),
     (("leafy", 36, 1.0, FERN), ("bush", 104, 0.8, MOSS), ("fir", 190, 1.08, SPRUCE),
-     ("fir", 252, 0.7, PINE), ("birch", 346, 1.0, OCHRE), ("oak", 448, 0.95, SPRUCE),
+     ("fir", 252, 0.7, PINE), ("birch", 338, 1.0, OCHRE), ("oak", 448, 0.95, SPRUCE),
      ("toadstool", 512, 0.9, RUST), ("fir", 566, 0.96, PINE)),
     (("oak", 96, 1.0, SPRUCE), ("toadstool", 22, 0.9, RUST), ("leafy", 196, 0.9, RUST),
      ("bush", 262, 0.8, FERN), ("fir", 338, 1.0, PINE), ("birch", 416, 0.9, FERN),
@@ -142,7 +142,7 @@ def _half_moon(rx: float, ry: float) -> Outline:
 def _height(hill: int, x: NDArray[np.float64] | float) -> NDArray[np.float64] | float:
     """The y of a hill's line: a wave that fits the width."""
     turn = 2.0 * np.pi / WIDTH
-    wave = 16.0 * np.sin(turn * x + 2.1 * hill) + 7.0 * np.sin(2.0 * turn * x + 1.3 * hill)
+    wave = 9.0 * np.sin(turn * x + 2.1 * hill) + 4.0 * np.sin(2.0 * turn * x + 1.3 * hill)
     return 188.0 + hill * HEIGHT / 3.0 + wave
 
 

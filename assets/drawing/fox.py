@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from drawing.sheet import Sheet, ellipse, mirrored, path
 
-PAPER, ORANGE, RUST, CHESTNUT, CREAM, DARK = "#f4e6cc", "#e67c33", "#cf6124", "#b04c1c", "#fff6e6", "#4a2b22"
+PAPER, ORANGE, RUST, CHESTNUT, CREAM, DARK = "#c8e2e2", "#e67c33", "#cf6124", "#b04c1c", "#fff6e6", "#4a2b22"
 TEAL, SAGE, RED, BLUSH = "#3f7f78", "#8db59a", "#c8443c", "#f0a070"
 
 EAR = path("M -50 2 C -56 -24 -54 -50 -48 -66 C -30 -56 -16 -46 -8 -34")

@@ -16,8 +16,8 @@ from click.testing import CliRunner
 import tracer
 from tracer.assets import builtin_scenes
 from tracer.cli.app import cli
-from tracer.scene_warnings import warnings_of
-from tracer.shapes import Sphere
+from tracer.scene_warnings import finite_extents, warnings_of
+from tracer.shapes import Plane, Sphere
 
 SCENES = builtin_scenes()
 WALLPAPERS = ["fox.png", "forest.png", "marble.png"]
@@ -98,6 +98,31 @@ def test_the_wallpaper_stands_upright(repository: Path) -> None:
     )
     color = tracer.render(scene, precision="double").color
     np.testing.assert_array_equal(np.floor(255 * color + 0.5), picture[:, :, ::-1])
+
+
+def test_the_ceiling_cuts_no_tree(repository: Path) -> None:
+    """The rows of the wallpaper at the ceiling's height lie between two lines of trees: they are plain."""
+    picture = picture_of(repository / "assets" / "forest.png")
+    ceiling = next(shape for shape in tracer.load(SCENES["classic"]).shapes if shape.name == "ceiling")
+    assert isinstance(ceiling, Plane)
+    highest = math.ceil(ceiling.placed_coefficients()[3]) - 1
+    row = len(picture) - 1 - highest % len(picture)
+    assert row == 210
+    assert len(np.unique(picture[row - 2 : row + 3].reshape(-1, 3), axis=0)) == 1
+
+
+def test_how_far_things_in_the_classic_room_are_from_what_carries_them() -> None:
+    scene = tracer.load(SCENES["classic"])
+    lowest, highest = {}, {}
+    for number, (points, radius) in finite_extents(scene).items():
+        name = scene.shapes[number].name
+        lowest[name] = (points[:, 1] - radius).min()
+        highest[name] = (points[:, 1] + radius).max()
+    assert lowest.pop("tetrahedron") == pytest.approx(63.6 - 110 / math.sqrt(3), abs=1e-4)
+    assert lowest.pop("cube") == pytest.approx(0.1, abs=1e-4)
+    assert lowest.pop("golden ball") - highest["cube"] == pytest.approx(0.1, abs=1e-4)
+    assert len(lowest) == 5
+    assert set(lowest.values()) == {0.0}
 
 
 @pytest.mark.parametrize("name", WALLPAPERS)
