@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help setup render test lint format clean distclean
+.PHONY: help setup render gallery docs test lint format clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -15,6 +15,12 @@ setup: ## create .venv with everything in it, and install LLVM 17 or newer where
 render: setup ## render scenes/classic.toml to out/classic.png and out/classic.exr
 	@mkdir -p out
 	@$(BIN)/tracer render scenes/classic.toml -o out/classic.png -o out/classic.exr
+
+gallery: setup ## render every scene of scenes/ into docs/gallery; what did not change is not rendered again
+	@$(BIN)/python -m scripts.gallery
+
+docs: setup ## build the documentation site into build/docs; open build/docs/index.html
+	@$(BIN)/python -m sphinx -q -W -n --keep-going -d build/doctrees docs build/docs
 
 test: lint ## run the linters, the type checker and all tests, quick and slow
 	$(BIN)/python -m pytest -m ""

@@ -4,36 +4,70 @@ missing."""
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
 
+import cv2
 import drjit as dr
 import numpy as np
 import pytest
 
 import tracer
-from tracer.assets import builtin_scenes
+from tracer.assets import ASSETS, builtin_scenes
 from tracer.color import decode_srgb, encode_srgb
 from tracer.lights import LIGHT_KINDS
-from tracer.scene_warnings import warnings_of
+from tracer.records import Record
+from tracer.scene import AffineImage, Checker, Image, Mesh, Stripes
+from tracer.scene.toml_files import read_toml
+from tracer.scene_warnings import finite_extents, warnings_of
 from tracer.shapes import SHAPE_KINDS
+from tracer.shapes.triangles import read_mesh
 from tracer.textures import TEXTURE_KINDS
 
 
-def test_every_kind_and_every_option_has_a_scene() -> None:
-    """Walks the registries and the switches of the model: a new one needs a scene that shows it."""
+def wanted(properties: Mapping[str, Any], owner: str) -> Iterator[str]:
+    """The keys of one table of the schema, and the values of those that are one of a few words or a flag."""
+    for key, schema in properties.items():
+        yield f"{owner}.{key}"
+        for form in (schema, *schema.get("anyOf", ())):
+            for value in form.get("enum", (True, False) if form.get("type") == "boolean" else ()):
+                yield f"{owner}.{key} = {value}"
+
+
+def shown(record: Record) -> Iterator[str]:
+    """The same of a record and those below it: keys that are stated, values that hold, by default too."""
+    owner = type(record).__name__
+    for key in type(record).model_fields:
+        value = getattr(record, key)
+        if key in record.model_fields_set:
+            yield f"{owner}.{key}"
+        if isinstance(value, (str, bool)):
+            yield f"{owner}.{key} = {value}"
+        entries = value.values() if isinstance(value, dict) else value if isinstance(value, list) else [value]
+        for entry in entries:
+            if isinstance(entry, Record):
+                yield from shown(entry)
+
+
+def test_every_key_and_every_choice_has_a_scene() -> None:
+    """Walks the whole schema: each key of each kind is stated in a scene, each of its choices is shown."""
+    schema = tracer.json_schema()
+    tables = {"Scene": schema, **schema["$defs"]}
+    missing = {name for owner, table in tables.items() for name in wanted(table["properties"], owner)}
+    assert {"Scene.base", "Camera.up", "Plane.u", "Checker.index = truncate", "Mesh.smooth = True"} < missing
+    for name, file in builtin_scenes().items():
+        missing -= {*shown(tracer.load(name)), *(f"Scene.{key}" for key in read_toml(file, name))}
+    assert sorted(missing) == []
+
+
+def test_every_kind_has_a_scene() -> None:
+    """Walks the registries: a new kind needs a scene that shows it."""
     scenes = [tracer.load(name) for name in builtin_scenes()]
     assert {shape.kind for scene in scenes for shape in scene.shapes} == set(SHAPE_KINDS)
     assert {light.kind for scene in scenes for light in scene.lights} == set(LIGHT_KINDS)
     assert {texture.kind for scene in scenes for texture in scene.textures.values()} == set(TEXTURE_KINDS)
-    for key in ("literal", "secondary_background", "transparent_shadows"):
-        assert any(getattr(scene, key) for scene in scenes), key
-    assert {scene.tir for scene in scenes} == {"drop", "reflect"}
-    assert {scene.color_space for scene in scenes} == {"display", "linear"}
-    assert {scene.diffuse_term for scene in scenes} == {"lambert", "reflection"}
     assert {scene.camera.is_look_at for scene in scenes} == {True, False}
-    assert any(scene.camera.depth_of_field for scene in scenes)
-    assert any(getattr(light, "jitter", False) for scene in scenes for light in scene.lights)
-    assert any(shape.texture_space == "object" for scene in scenes for shape in scene.shapes)
-    assert any(getattr(shape, "smooth", False) for scene in scenes for shape in scene.shapes)
 
 
 @pytest.mark.parametrize("name", [name for name in builtin_scenes() if "_" in name])
@@ -147,6 +181,115 @@ def test_literal_cells_around_zero_are_twice_as_wide() -> None:
     changes = np.abs((x * 1.5)[1:][row[1:] != row[:-1]])  # the wall is half as far again as the canvas
     expected = [40, 40, 80, 80, 120, 120, 160, 160, 200, 200]
     np.testing.assert_allclose(np.sort(changes[changes < 230]), expected, atol=2)
+
+
+def test_height_and_belly_of_the_teapot() -> None:
+    """3.15 high, 0.01 above the table; at 0.9 the belly reaches 2 from the axis, at 1.8 the handle 3."""
+    scene = tracer.load("shape_teapot")
+    o = np.array([[0, 9, 0], [0, 0.91, 9], [-9, 1.81, 0], [0, 0.005, 9]])
+    d = [[0, -1, 0], [0, 0, -1], [1, 0, 0], [0, 0, -1]]
+    hits = tracer.intersect(scene, o, d)
+    np.testing.assert_allclose(hits.t[:3], [9 - 3.16, 9 - 2, 9 - 3], rtol=1e-6)
+    names = [scene.shapes[number].name for number in hits.shape]
+    assert names == ["teapot"] * 3 + ["wall"], "the last ray passes between pot and table"
+
+
+def test_the_teapot_has_only_its_six_open_rims(repository: Path) -> None:
+    """Body, lid, both ends of handle and spout; every other edge belongs to two triangles, turned alike."""
+    mesh = tracer.load("shape_teapot").shapes[1]
+    assert isinstance(mesh, Mesh)
+    faces = read_mesh(mesh, repository / "assets" / "teapot.obj", "teapot").triangles
+    edges = {(face[i], face[i - 2]) for face in faces.tolist() for i in range(3)}
+    assert len(edges) == 3 * len(faces) == 3 * 4032
+    follower = {a: b for a, b in edges if (b, a) not in edges}
+    rims = 0
+    while follower:
+        start, point = follower.popitem()
+        while point != start:
+            point = follower.pop(point)
+        rims += 1
+    assert rims == 6
+
+
+def picture_of(texture: Image | AffineImage) -> np.ndarray:
+    """The colors (h, w, 3) of a picture texture's file; rows count upwards, with `flip_v` downwards."""
+    pixels = cv2.imread(str(ASSETS / Path(texture.file).name))
+    assert pixels is not None
+    return (pixels if texture.flip_v else pixels[::-1])[:, :, ::-1] / 255
+
+
+def cell_colors(texture: Any, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The colors of a texture on z = 0 by its definition, and where that is clear of a cell's border."""
+    if isinstance(texture, Stripes):
+        q = np.stack([(x + y) / texture.interval])
+    elif isinstance(texture, Checker):
+        q = np.stack([x, y]) / texture.interval
+    else:
+        q = np.stack([x, y]) * (texture.matrix[0][0] if isinstance(texture, AffineImage) else 1)
+    cells = (np.floor(q) if texture.index == "floor" else np.abs(np.trunc(q))).astype(int)
+    if isinstance(texture, (Stripes, Checker)):
+        colors = np.array(texture.colors)[cells.sum(axis=0) % len(texture.colors)]
+    else:
+        colors = picture_of(texture)[cells[1] % 640, cells[0] % 640]
+    return colors, (np.abs(q - np.round(q)) > 1e-3).all(axis=0)
+
+
+def test_cells_down_and_towards_zero() -> None:
+    """Every panel shows its texture as counted from its own middle."""
+    scene = tracer.load("texture_index")
+    result = tracer.render(scene, supersample=1, precision="double", aovs=("shape", "position"))
+    for number, shape in enumerate(scene.shapes):
+        seen = result.aovs["shape"] == number
+        x, y = (result.aovs["position"][seen][:, axis] - shape.translate[axis] for axis in (0, 1))
+        assert np.ptp(x) > 200 and np.ptp(y) > 310, "the whole panel is in view"
+        colors, clear = cell_colors(scene.textures[str(shape.texture)], x, y)
+        np.testing.assert_allclose(result.color[seen][clear], colors[clear], rtol=1e-12)
+        assert clear.mean() > 0.85
+
+
+def test_pictures_along_three_directions() -> None:
+    """(u, v) = (x - 100, y - 50) on the back wall, (y, z) on the left wall, (x, z) on the floor."""
+    scene = tracer.load("texture_direction", overrides={"ambient": 1.0})
+    result = tracer.render(scene, scale=0.5, supersample=1, precision="double", aovs=("shape", "position"))
+    x, y, z = np.moveaxis(result.aovs["position"], 2, 0)
+    places = {"floor": (x, z), "back wall": (x - 100, y - 50), "left wall": (y, z)}
+    for number, shape in enumerate(scene.shapes):
+        seen = result.aovs["shape"] == number
+        assert seen.sum() > 1000
+        texture = scene.textures[str(shape.texture)]
+        assert isinstance(texture, Image)
+        picture = picture_of(texture)
+        u, v = (coordinate[seen] - 0.5 for coordinate in places[str(shape.name)])
+        column, row = (np.floor(c).astype(int) for c in (u, v))
+        expected = np.zeros((len(u), 3))
+        for i, j in np.ndindex(2, 2):
+            weight = np.abs(1 - i - (u - column)) * np.abs(1 - j - (v - row))
+            expected += weight[:, None] * picture[(row + j) % len(picture), (column + i) % len(picture)]
+        np.testing.assert_allclose(result.color[seen], expected, atol=1e-9)
+
+
+def test_light_of_five_kinds_adds_up() -> None:
+    """The light's terms are linear in its color: the picture is the sum of those with one light each."""
+    scene = tracer.load("light_colors")
+    whole = tracer.render(scene, scale=0.25, supersample=1, precision="double").color
+    total = np.zeros_like(whole)
+    for light in scene.lights:
+        black = {f'lights."{other.name}".color': "#000000" for other in scene.lights if other is not light}
+        one = tracer.load("light_colors", overrides=black)
+        part = tracer.render(one, scale=0.25, supersample=1, precision="double").color
+        assert part.max() > 0.03
+        total += part
+    np.testing.assert_allclose(total, whole, atol=1e-12)
+
+
+def test_scene_on_a_base() -> None:
+    """What the new scene does not name is the base's; its cube stands 0.01 above the floor."""
+    base, scene = tracer.load("option_linear"), tracer.load("option_base")
+    assert (scene.camera, scene.lights, scene.materials) == (base.camera, base.lights, base.materials)
+    assert (scene.color_space, scene.diffuse_term) == ("linear", "reflection")
+    assert [shape.name for shape in scene.shapes] == ["floor", "cube"]
+    corners, _ = finite_extents(scene)[1]
+    assert corners[:, 1].min() == pytest.approx(0.01, abs=1e-6)
 
 
 @pytest.mark.parametrize("width", [1, 7, 1000])

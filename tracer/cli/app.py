@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import click
 
+from tracer.cli.classic import classic
 from tracer.cli.compare import compare
 from tracer.cli.doctor import doctor
 from tracer.cli.failures import BROKEN_PIPE, report
@@ -33,6 +34,7 @@ def cli(context: click.Context) -> None:
     Examples:
       tracer scenes                          what is built in
       tracer render room                     writes room.png
+      tracer classic                         asks six questions, writes classic.png
       tracer render my.toml -o out/{name}.png -o out/{name}.exr
       tracer render --help                   all options
     """
@@ -40,7 +42,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (render, scenes, info, compare, doctor):
+for _command in (render, classic, scenes, info, compare, doctor):
     cli.add_command(_command)
 
 

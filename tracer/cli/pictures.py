@@ -1,9 +1,9 @@
-"""What `tracer render` does: plan, trace, save, tell; one scene after the other."""
+"""What `tracer render` and `tracer classic` do: plan, trace, save, tell; one scene after the other."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,12 +18,13 @@ from tracer.cli.progress import make_reporter
 from tracer.cli.statistics import KernelRecord, format_statistics, seconds_since_start
 from tracer.film.result import Result
 from tracer.render import RenderInterrupted, render
+from tracer.scene import Scene, load
 from tracer.scene_warnings import warnings_of
 
 
 @dataclass(frozen=True)
 class Wishes:
-    """The options of `tracer render`, as click delivers them."""
+    """What `scene_options` and `picture_options` ask for, as click delivers it."""
 
     outputs: tuple[str, ...]
     overrides: tuple[str, ...]
@@ -61,11 +62,20 @@ class Wishes:
         return "none" if self.quiet and self.progress == "auto" else self.progress
 
 
-def render_scenes(sources: Sequence[str], wishes: Wishes, interruption: Interruption) -> int:
-    """Renders all scenes and returns the exit code."""
+def render_scenes(
+    sources: Sequence[str],
+    wishes: Wishes,
+    interruption: Interruption,
+    load_scene: Callable[[str], Scene] | None = None,
+) -> int:
+    """Renders all scenes and returns the exit code; `load_scene` stands in for loading a source as it is."""
+
+    def load_source(source: str) -> Scene:
+        return load(source, allow_outside=wishes.allow_outside, overrides=wishes.overrides)
+
     interruption.quiet = wishes.quiet
     imported = seconds_since_start()
-    plan = make_plan(sources, wishes.outputs, wishes.overrides, wishes.allow_outside, wishes.settings)
+    plan = make_plan(sources, wishes.outputs, load_scene or load_source, wishes.settings)
     if not plan.jobs:
         return plan.worst
     find_backend(wishes.backend, wishes.precision)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from tracer.cli.failures import report
 from tracer.errors import OutputError, TracerError, UsageError
 from tracer.film.atomic import check_writable, fill_template
-from tracer.scene import Scene, find_scene, load
+from tracer.scene import Scene, find_scene
 from tracer.settings import Settings, picture_canvas, picture_rectangle
 
 DEFAULT_OUTPUT = "{name}.png"
@@ -42,11 +42,10 @@ class Plan:
 def make_plan(
     sources: Sequence[str],
     templates: Sequence[str],
-    overrides: Sequence[str],
-    allow_outside: bool,
+    load_scene: Callable[[str], Scene],
     settings: dict[str, Any],
 ) -> Plan:
-    """Loads and checks all scenes; a bad one is reported and left out.
+    """Loads and checks all scenes, each with `load_scene`; a bad one is reported and left out.
 
     Raises `UsageError` or `OutputError` for what concerns them all: options, files that cannot be written.
     """
@@ -56,7 +55,7 @@ def make_plan(
     for source in files:
         started = time.perf_counter()
         try:
-            scene = load(source, allow_outside=allow_outside, overrides=overrides)
+            scene = load_scene(source)
             picture_rectangle(checked.crop, picture_canvas(scene, checked))
         except TracerError as error:
             plan.refuse(error)

@@ -1,0 +1,1 @@
+"""Renders every scene into docs/gallery: `python -m scripts.gallery`, or `make gallery`."""
