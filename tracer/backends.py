@@ -32,6 +32,7 @@ INVALID = 0xFFFFFFFF
 class Backend:
     """The Dr.Jit types of one combination of backend, precision and differentiability.
 
+    `FloatN` and `SingleN` are vectors of any length, the latter in single precision in either case;
     `epsilon` is the unit roundoff: 2^-24 in single, 2^-53 in double precision.
     """
 
@@ -41,6 +42,8 @@ class Backend:
     Vector2: Any
     Vector3: Any
     Vector4: Any
+    FloatN: Any
+    SingleN: Any
     IdVector4: Any
     UInt32: Any
     Int32: Any
@@ -73,6 +76,10 @@ class Backend:
         speed.
         """
         return _aligned(self.Float, np.ascontiguousarray(rows, self.dtype).ravel(), self.UInt32)
+
+    def single_table(self, rows: Any) -> Any:
+        """Uploads numbers in single precision, whatever the precision of `Float`, like `table`."""
+        return _aligned(dr.value_t(self.SingleN), np.ascontiguousarray(rows, np.float32).ravel(), self.UInt32)
 
     def id_table(self, ids: Any) -> Any:
         """Uploads unsigned integers, like `table`."""
@@ -121,6 +128,8 @@ def _types(name: BackendName, precision: Precision, gradients: bool) -> Backend:
         Vector2=getattr(module, f"Array2f{suffix}"),
         Vector3=getattr(module, f"Array3f{suffix}"),
         Vector4=getattr(module, f"Array4f{suffix}"),
+        FloatN=getattr(module, f"ArrayXf{suffix}"),
+        SingleN=module.ArrayXf,
         IdVector4=module.Array4u,
         UInt32=module.UInt32,
         Int32=module.Int32,

@@ -12,14 +12,17 @@ from typing import Any
 import numpy as np
 
 from tracer.acceleration.build import build_hierarchy
-from tracer.acceleration.traverse import TriangleTables
+from tracer.acceleration.layout import OCTANTS, threaded
+from tracer.acceleration.triangle import CONTACT_SLACK, TRIANGLE_WORDS
+from tracer.acceleration.walk import TriangleTables
 from tracer.backends import INVALID, Backend
 from tracer.color import decode_srgb
 from tracer.errors import SceneError
-from tracer.light_samples import LightTables, compile_lights
+from tracer.light_tables import LightTables, compile_lights
 from tracer.material import Material
 from tracer.ray import SIDE_BITS
 from tracer.scene import Scene
+from tracer.shafts import Ball, Enclosure, ball_around
 from tracer.shapes import Instance, Mesh, Plane, ShapeRecord, Sphere
 from tracer.shapes.sphere_table import SphereTable
 from tracer.shapes.triangles import MeshData, PlacedMesh, place_mesh, read_mesh
@@ -35,6 +38,12 @@ KIND_UNIT = 256
 UNROLLED_SPHERES = 32
 """Up to so many spheres stand in the kernel one by one; more are looped over."""
 
+SINGLE_ENCLOSURES = 8
+"""Up to so many meshes have a ball of their own around them; more share one."""
+
+LARGEST_CONVEX = 128
+"""Triangles of a mesh that is tested for being convex, at most."""
+
 
 @dataclass(frozen=True)
 class Options:
@@ -48,7 +57,7 @@ class Options:
 
 @dataclass
 class SmoothTables:
-    """Vertex normals: 12 floats a triangle (3 unit normals, padded), and which shapes want them."""
+    """Unit vertex normals in rows like those of the triangles, and which shapes want them."""
 
     normals: Any
     shapes: Any
@@ -72,11 +81,11 @@ class DeviceScene:
     """A scene in Dr.Jit memory, for one backend and precision.
 
     `slots`: planes and spheres that stand in the kernel one by one, in the order of the shapes;
-    `sphere_table`: all spheres when they are many; `triangles`: those of all meshes. Tables by shape, in
-    packets of four: `geometry` (plane n, d or sphere center, radius), `ids` (shape kind times 256 plus
-    texture flags, first color, count of colors, plane bit), `surfaces` (ior, k_r, k_t, k_a; m, h, s, texture
-    rate), `object_space` (the 3x4 matrix back), `first_primitive` (one each). By primitive, when there are
-    meshes: `shape_of`, `triangle_of`.
+    `sphere_table`: all spheres when they are many; `triangles`: those of all meshes; `enclosures`: balls
+    around the meshes. Tables by shape, in packets of four: `geometry` (plane n, d or sphere center, radius),
+    `ids` (shape kind times 256 plus texture flags, first color, count of colors, plane bit), `surfaces`
+    (ior, k_r, k_t, k_a; m, h, s, texture rate), `object_space` (the 3x4 matrix back), `first_primitive` (one
+    each). By primitive, when there are meshes: `shape_of`, and `slot_of` its triangle in the hierarchy.
     """
 
     backend: Backend
@@ -85,9 +94,10 @@ class DeviceScene:
     slots: list[Any]
     sphere_table: SphereTable | None
     triangles: TriangleTables | None
+    enclosures: list[Enclosure]
     smooth: SmoothTables | None
     shape_of: Any
-    triangle_of: Any
+    slot_of: Any
     geometry: Any
     ids: Any
     first_primitive: Any
@@ -116,6 +126,7 @@ def compile_scene(scene: Scene, backend: Backend) -> DeviceScene:
     host = HostScene(first, meshes, _extent(scene, rows, meshes))
     decode = decode_srgb if scene.color_space == "linear" else np.asarray
     slots, sphere_table, planes = _analytic_shapes(scene, backend, rows, first)
+    triangles, leaf_slots = _triangle_tables(backend, meshes, first) if meshes else (None, np.zeros(0, int))
     packer = TexturePacker(scene.literal, decode, lambda file: read_picture(scene.resolve(file)))
     textures = _textures(scene, packer)
     return DeviceScene(
@@ -129,10 +140,11 @@ def compile_scene(scene: Scene, backend: Backend) -> DeviceScene:
         kinds=frozenset(_kind(shape) for shape in scene.shapes),
         slots=slots,
         sphere_table=sphere_table,
-        triangles=_triangle_tables(backend, host) if meshes else None,
-        smooth=_smooth_tables(scene, backend, meshes),
+        triangles=triangles,
+        enclosures=_enclosures(backend, meshes),
+        smooth=_smooth_tables(scene, backend, meshes, leaf_slots),
         shape_of=backend.id_table(np.repeat(np.arange(len(counts)), counts)) if meshes else None,
-        triangle_of=backend.id_table(_triangle_numbers(counts, meshes)) if meshes else None,
+        slot_of=backend.id_table(_slot_of_primitive(counts, meshes, leaf_slots)) if meshes else None,
         geometry=backend.table(rows),
         ids=backend.id_table(_id_rows(scene, textures)),
         first_primitive=backend.id_table(first[:-1] if len(first) > 1 else [0]),
@@ -257,41 +269,69 @@ def _placed_meshes(scene: Scene) -> dict[int, PlacedMesh]:
     return placed
 
 
-def _triangle_tables(backend: Backend, host: HostScene) -> TriangleTables:
-    corners = np.concatenate([mesh.corners for mesh in host.meshes.values()])
-    normals = np.concatenate([mesh.normals for mesh in host.meshes.values()])
-    rows = np.concatenate([corners.reshape(-1, 9), normals], axis=1)
+def _triangle_tables(
+    backend: Backend, meshes: dict[int, PlacedMesh], first: np.ndarray
+) -> tuple[TriangleTables, np.ndarray]:
+    """The triangles of all meshes in the order of the leaves, the tree over them, and the slot of each."""
+    corners = np.concatenate([mesh.corners for mesh in meshes.values()])
+    normals = np.concatenate([mesh.normals for mesh in meshes.values()])
+    primitives = np.concatenate([np.arange(len(mesh.corners)) + first[i] for i, mesh in meshes.items()])
     hierarchy = build_hierarchy(corners)
-    boxes = np.zeros((len(hierarchy.boxes), 8))
-    boxes[:, 0:3], boxes[:, 4:7] = hierarchy.boxes[:, :3], hierarchy.boxes[:, 3:]
-    primitives = [
-        np.arange(len(mesh.corners)) + host.first_primitive[shape] for shape, mesh in host.meshes.items()
-    ]
-    return TriangleTables(
-        triangles=backend.table(rows),
-        boxes=backend.table(boxes),
-        order=backend.id_table(hierarchy.order),
-        primitive=backend.id_table(np.concatenate(primitives)),
-        leaf_count=backend.opaque_id(hierarchy.leaf_count),
+    rows = np.zeros((len(corners), TRIANGLE_WORDS))
+    rows[:, :9], rows[:, 9:12] = corners.reshape(-1, 9), normals
+    rows[:, 12], rows[:, 13] = primitives >> 16, primitives & 0xFFFF
+    nodes = threaded(hierarchy)
+    tables = TriangleTables(
+        triangles=backend.table(rows[hierarchy.order]),
+        nodes=backend.single_table(nodes),
+        count=backend.opaque_id(len(nodes) // OCTANTS),
         extent=backend.opaque(np.abs(corners).max()),
     )
+    return tables, np.argsort(hierarchy.order)
 
 
-def _triangle_numbers(counts: list[int], meshes: dict[int, PlacedMesh]) -> np.ndarray:
-    """For each primitive its place among all triangles (0 for planes and spheres, which never ask)."""
-    is_triangle = np.repeat([i in meshes for i in range(len(counts))], counts)
-    return np.where(is_triangle, np.cumsum(is_triangle) - 1, 0)
+def _enclosures(backend: Backend, meshes: dict[int, PlacedMesh]) -> list[Enclosure]:
+    """A ball around each mesh, or one around all of many."""
+
+    def around(points: np.ndarray, shape: int, convex: bool) -> Enclosure:
+        return Enclosure(
+            Ball.of(backend, ball_around(points, backend.epsilon)), backend.opaque_id(shape), convex
+        )
+
+    if len(meshes) > SINGLE_ENCLOSURES:
+        return [around(np.concatenate([m.corners.reshape(-1, 3) for m in meshes.values()]), INVALID, False)]
+    return [
+        around(mesh.corners.reshape(-1, 3), shape, _is_convex(mesh, backend.epsilon))
+        for shape, mesh in meshes.items()
+    ]
 
 
-def _smooth_tables(scene: Scene, backend: Backend, meshes: dict[int, PlacedMesh]) -> SmoothTables | None:
+def _is_convex(mesh: PlacedMesh, epsilon: float) -> bool:
+    """Whether no vertex rises above any triangle by more than rounding; large meshes are not looked at."""
+    if len(mesh.corners) > LARGEST_CONVEX:
+        return False
+    points = mesh.corners.reshape(-1, 3)
+    heights = mesh.normals @ points.T - (mesh.normals * mesh.corners[:, 0]).sum(axis=1)[:, None]
+    return bool(heights.max() <= CONTACT_SLACK / 2 * epsilon * np.abs(points).max())
+
+
+def _slot_of_primitive(counts: list[int], meshes: dict[int, PlacedMesh], slots: np.ndarray) -> np.ndarray:
+    """For each primitive the slot of its triangle (0 for planes and spheres, which never ask)."""
+    result = np.zeros(sum(counts), np.int64)
+    result[np.repeat([i in meshes for i in range(len(counts))], counts)] = slots
+    return result
+
+
+def _smooth_tables(
+    scene: Scene, backend: Backend, meshes: dict[int, PlacedMesh], slots: np.ndarray
+) -> SmoothTables | None:
     wanted = [
         i in meshes and bool(_inherited(scene, shape, "smooth")) for i, shape in enumerate(scene.shapes)
     ]
     if not any(wanted):
         return None
-    normals = np.concatenate([mesh.corner_normals for mesh in meshes.values()]).reshape(-1, 9)
-    rows = np.zeros((len(normals), 12))
-    rows[:, :9] = normals
+    rows = np.zeros((len(slots), TRIANGLE_WORDS))
+    rows[slots, :9] = np.concatenate([mesh.corner_normals for mesh in meshes.values()]).reshape(-1, 9)
     return SmoothTables(backend.table(rows), backend.id_table(wanted))
 
 

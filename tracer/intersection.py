@@ -1,6 +1,6 @@
-"""What a ray meets: the nearest hit, what hides a light, and the surface at a hit.
+"""What a ray meets: the nearest hit, and the surface there.
 
-The same three functions serve the camera, the ray queries, the accuracy suite and the viewer; none of them
+The same functions serve the camera, the ray queries, the accuracy suite and the viewer; none of them
 knows where its rays come from.
 """
 
@@ -11,12 +11,22 @@ from typing import Any
 
 import drjit as dr
 
-from tracer.acceleration.departure import Departure
+from tracer.acceleration.departure import Departure, Ground
 from tracer.acceleration.traverse import visit_triangles
-from tracer.acceleration.triangle import TriangleTest, gather_triangle
+from tracer.acceleration.triangle import gather_triangle
 from tracer.backends import INVALID
 from tracer.device_scene import KIND_UNIT, MESH, PLANE, SPHERE, DeviceScene
-from tracer.ray import Hit, Ray, Segment, departure_word, keep_nearer, max_abs, no_hit, normalize, select_max
+from tracer.ray import (
+    Hit,
+    Ray,
+    departure_word,
+    keep_nearer,
+    max_abs,
+    mirror_direction,
+    no_hit,
+    normalize,
+    select_max,
+)
 from tracer.shapes.plane import PlaneSlot
 from tracer.shapes.sphere import SphereSlot
 
@@ -28,14 +38,15 @@ class Surface:
     """The surface at n hits.
 
     `p`: the hit point, moved onto the surface; `outward`: geometric unit normal; `normal`: shading normal
-    that faces the ray; `entering`: the ray comes from the side that `outward` points to; `lit_side`:
-    geometric normal facing the ray; `shape`, `primitive`: numbers; `ids`: the shape's row of
-    `DeviceScene.ids`; `view`: see `Ray`.
+    that faces the ray; `mirrored`: the ray's direction mirrored by it; `entering`: the ray comes from the
+    side that `outward` points to; `lit_side`: geometric normal facing the ray; `shape`, `primitive`:
+    numbers; `ids`: the shape's row of `DeviceScene.ids`; `view`: see `Ray`.
     """
 
     p: Any
     outward: Any
     normal: Any
+    mirrored: Any
     lit_side: Any
     entering: Any
     shape: Any
@@ -76,91 +87,13 @@ def closest_hit(scene: DeviceScene, ray: Ray, active: Any, t_max: Any = None) ->
             scene.backend,
             scene.triangles,
             ray,
-            departure(scene, ray),
+            lambda: departure(scene, ray),
             state=hit,
             limit=lambda hit: hit.t,
             visit=lambda hit, t, primitive, _test, valid: keep_nearer(hit, t, valid, primitive),
             active=active,
         )
     return Hit(hit.t, dr.select(active, hit.primitive, INVALID))
-
-
-def hidden(scene: DeviceScene, segment: Segment, active: Any) -> Any:
-    """Mask: some shape lies strictly between the shaded point and the light (document, section 4)."""
-    blocked = ~active
-    for slot in scene.slots:
-        blocked = blocked | slot.blocks(segment, active)
-    if scene.sphere_table is not None:
-        blocked = blocked | scene.sphere_table.blocks(segment, active & ~blocked)
-    if scene.triangles is not None:
-        never = scene.backend.Float(-1)
-        blocked = visit_triangles(
-            scene.backend,
-            scene.triangles,
-            segment.ray,
-            departure(scene, segment.ray),
-            state=blocked,
-            limit=lambda blocked: dr.select(blocked, never, segment.length),
-            visit=lambda blocked, _t, _primitive, test, valid: (
-                blocked | (valid & ~_holds_light(segment, test))
-            ),
-            active=~blocked,
-        )
-    return blocked & active
-
-
-def transmittance(scene: DeviceScene, segment: Segment, active: Any) -> Any:
-    """Share of light that arrives when every surface crossed lets k_t through (`transparent_shadows`)."""
-    backend = scene.backend
-    share = dr.select(active, backend.Float(1), 0)
-    for slot in scene.slots:
-        count = slot.crossings(segment, active)
-        share = share * _power_0_1_2(_refraction_of(scene, slot.primitive), count)
-    if scene.sphere_table is not None:
-        share = scene.sphere_table.fold(
-            share,
-            active,
-            lambda share, slot: (
-                share * _power_0_1_2(_refraction_of(scene, slot.primitive), slot.crossings(segment, active))
-            ),
-            lambda share: share > 0,
-        )
-    if scene.triangles is not None:
-        never = backend.Float(-1)
-        share = visit_triangles(
-            backend,
-            scene.triangles,
-            segment.ray,
-            departure(scene, segment.ray),
-            state=share,
-            limit=lambda share: dr.select(share > 0, segment.length, never),
-            visit=lambda share, _t, primitive, test, valid: dr.select(
-                valid & ~_holds_light(segment, test),
-                share * _crossed(_refraction_of(scene, primitive), test.owned),
-                share,
-            ),
-            active=active,
-        )
-    return share
-
-
-def _holds_light(segment: Segment, test: TriangleTest) -> Any:
-    """Mask: the light lies on the triangle's plane within rounding, so the triangle does not hide it."""
-    return dr.abs(test.height + segment.length * test.speed) <= test.slack
-
-
-def _refraction_of(scene: DeviceScene, primitive: Any) -> Any:
-    return dr.gather(scene.backend.Float, scene.surfaces, shape_of(scene, primitive, True) * 8 + 2)
-
-
-def _crossed(factor: Any, owned: Any) -> Any:
-    """The factor of a surface that is crossed; exactly on an edge only one of two neighbors counts, but an
-    opaque one always does."""
-    return dr.select(owned | (factor == 0), factor, 1)
-
-
-def _power_0_1_2(factor: Any, count: Any) -> Any:
-    return dr.select(count == 0, 1, dr.select(count == 1, factor, factor * factor))
 
 
 def shape_of(scene: DeviceScene, primitive: Any, active: Any) -> Any:
@@ -187,7 +120,8 @@ def surface_at(scene: DeviceScene, ray: Ray, hit: Hit, active: Any) -> Surface:
     if scene.triangles is not None:
         at_origin = ray.departing & (hit.t <= 8 * backend.epsilon * max_abs(p))
         view = dr.select(at_origin, ray.view, -ray.d)  # a ray that did not move has seen nothing new
-    return Surface(p, outward, normal, lit_side, entering, shape, hit.primitive, ids, view)
+    mirrored = mirror_direction(ray.d, normal)
+    return Surface(p, outward, normal, mirrored, lit_side, entering, shape, hit.primitive, ids, view)
 
 
 def _geometry_at(
@@ -202,18 +136,25 @@ def _geometry_at(
             p_k, n_k = surface(row, p)
             point, normal = dr.select(kind == analytic, p_k, point), dr.select(kind == analytic, n_k, normal)
     if scene.triangles is not None:
-        is_mesh = active & (kind == MESH)
-        triangle = gather_triangle(
-            backend, scene.triangles.triangles, _triangle_index(scene, primitive, is_mesh), is_mesh
+        tables = scene.triangles.triangles
+
+        def on_triangle(point: Any, normal: Any) -> tuple[Any, Any]:
+            triangle = gather_triangle(backend, tables, _slot(scene, primitive, True))
+            height = dr.dot(triangle.normal, p - triangle.v0)
+            return dr.fma(-height, triangle.normal, p), triangle.normal
+
+        point, normal = dr.if_stmt(
+            args=(point, normal),
+            cond=active & (kind == MESH),
+            true_fn=on_triangle,
+            false_fn=lambda point, normal: (point, normal),
+            label="on a triangle",
         )
-        height = dr.dot(triangle.normal, p - triangle.v0)
-        point = dr.select(is_mesh, dr.fma(-height, triangle.normal, p), point)
-        normal = dr.select(is_mesh, triangle.normal, normal)
     return point, normal
 
 
-def _triangle_index(scene: DeviceScene, primitive: Any, active: Any) -> Any:
-    return dr.gather(scene.backend.UInt32, scene.triangle_of, primitive, active)
+def _slot(scene: DeviceScene, primitive: Any, active: Any) -> Any:
+    return dr.gather(scene.backend.UInt32, scene.slot_of, primitive, active)
 
 
 def _smooth_normal(
@@ -230,16 +171,26 @@ def _smooth_normal(
     ray."""
     assert scene.smooth is not None and scene.triangles is not None
     backend = scene.backend
+    triangles, vertex_normals = scene.triangles.triangles, scene.smooth.normals
+
+    def interpolated(lit_side: Any) -> tuple[Any]:
+        slot = _slot(scene, primitive, True)
+        triangle = gather_triangle(backend, triangles, slot)
+        normals = gather_triangle(backend, vertex_normals, slot)
+        b1, b2 = barycentrics(triangle.v0, triangle.v1, triangle.v2, p)
+        mixed = normalize((1 - b1 - b2) * normals.v0 + b1 * normals.v1 + b2 * normals.v2)
+        mixed = dr.select(entering, mixed, -mixed)
+        return (dr.select(dr.dot(mixed, d) < 0, mixed, lit_side),)
+
     wanted = dr.gather(backend.UInt32, scene.smooth.shapes, shape, active)
-    active = active & (wanted == 1)
-    index = _triangle_index(scene, primitive, active)
-    triangle = gather_triangle(backend, scene.triangles.triangles, index, active)
-    normals = gather_triangle(backend, scene.smooth.normals, index, active)
-    b1, b2 = barycentrics(triangle.v0, triangle.v1, triangle.v2, p)
-    mixed = normalize((1 - b1 - b2) * normals.v0 + b1 * normals.v1 + b2 * normals.v2)
-    mixed = dr.select(entering, mixed, -mixed)
-    usable = active & (dr.dot(mixed, d) < 0)
-    return dr.select(usable, mixed, lit_side)
+    (normal,) = dr.if_stmt(
+        args=(lit_side,),
+        cond=active & (wanted == 1),
+        true_fn=interpolated,
+        false_fn=lambda lit_side: (lit_side,),
+        label="smooth",
+    )
+    return normal
 
 
 def barycentrics(v0: Any, v1: Any, v2: Any, p: Any) -> tuple[Any, Any]:
@@ -255,33 +206,50 @@ def departure(scene: DeviceScene, ray: Ray) -> Departure:
     """What rays know of the surface that they leave, looked up by its id."""
     backend = scene.backend
     active = ray.departing
-    primitive = ray.departure >> 1
-    shape = shape_of(scene, primitive, active)
-    kind = dr.gather(backend.IdVector4, scene.ids, shape, active).x // KIND_UNIT
-    row = dr.gather(backend.Vector4, scene.geometry, shape, active)
-    center = backend.Vector3(row.x, row.y, row.z)
-    is_mesh = active & (kind == MESH)
+    kind, row = _left(scene, ray, active)
     assert scene.triangles is not None
-    triangle = gather_triangle(
-        backend, scene.triangles.triangles, _triangle_index(scene, primitive, is_mesh), is_mesh
-    )
-    outward = dr.select(
-        is_mesh, triangle.normal, dr.select(kind == SPHERE, normalize(ray.o - center), center)
-    )
+    is_mesh = active & (kind == MESH)
+    slot = _slot(scene, ray.departure >> 1, is_mesh)
+    end = dr.gather(backend.Vector4, scene.triangles.triangles, slot * 4 + 2, is_mesh)
+    center = backend.Vector3(row.x, row.y, row.z)
+    outward = dr.select(kind == SPHERE, normalize(ray.o - center), center)
+    outward = dr.select(is_mesh, backend.Vector3(end.y, end.z, end.w), outward)
     # A smooth mesh may send a ray to the other side of its facet than its word says: there the direction
     # decides.
     below = dr.select(is_mesh, dr.dot(outward, ray.d) < 0, ray.inside)
-    normal = dr.select(below, -outward, outward)
-    climb = dr.dot(normal, ray.d)
-    return Departure(
-        active=active,
-        primitive=primitive,
-        normal=normal,
+    return _departure(scene, ray, active, dr.select(below, -outward, outward))
+
+
+def departure_to_light(scene: DeviceScene, ray: Ray, surface: Surface) -> Departure:
+    """The same for a ray that leaves a known surface on its lit side."""
+    return _departure(scene, ray, dr.full(scene.backend.Bool, True, dr.width(ray.d)), surface.lit_side)
+
+
+def _departure(scene: DeviceScene, ray: Ray, active: Any, normal: Any) -> Departure:
+    climb = select_max(dr.dot(normal, ray.d), scene.backend.Float(0))
+    return Departure(active, ray.departure >> 1, normal, lambda: _ground(scene, ray, active), ray.view, climb)
+
+
+def _ground(scene: DeviceScene, ray: Ray, active: Any) -> Ground:
+    """Where the surface lies that rays leave."""
+    backend = scene.backend
+    kind, row = _left(scene, ray, active)
+    assert scene.triangles is not None
+    is_mesh = active & (kind == MESH)
+    triangle = gather_triangle(backend, scene.triangles.triangles, _slot(scene, ray.departure >> 1, is_mesh))
+    center = backend.Vector3(row.x, row.y, row.z)
+    return Ground(
         corners=tuple(dr.select(is_mesh, v, center) for v in (triangle.v0, triangle.v1, triangle.v2)),
         reach=dr.select(kind == SPHERE, row.w, dr.select(kind == PLANE, float("inf"), 0)),
-        view=ray.view,
-        climb=select_max(climb, backend.Float(0)),
     )
+
+
+def _left(scene: DeviceScene, ray: Ray, active: Any) -> tuple[Any, Any]:
+    """Kind and geometry of the shape that rays leave."""
+    backend = scene.backend
+    shape = shape_of(scene, ray.departure >> 1, active)
+    kind = dr.gather(backend.IdVector4, scene.ids, shape, active).x // KIND_UNIT
+    return kind, dr.gather(backend.Vector4, scene.geometry, shape, active)
 
 
 def leave(ray: Ray, surface: Surface, d: Any, crosses: bool) -> Ray:

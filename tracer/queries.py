@@ -19,7 +19,7 @@ from tracer.errors import UsageError
 from tracer.intersection import closest_hit, free_ray, leave, surface_at
 from tracer.ray import Hit, Ray, normalize
 from tracer.scene import Scene
-from tracer.spawn import material_at, mirror_direction, refract_direction
+from tracer.spawn import material_at, refract_direction
 
 END_GUARD = {"single": 1e-5, "double": 1e-9}
 """`visible`: hits nearer to either end than this times S do not count."""
@@ -164,8 +164,7 @@ def trace_path(
 def _event(device: DeviceScene, ray: Ray, surface: Any, event: str, active: Any) -> tuple[Ray, Any]:
     """The ray after a mirror reflection or a refraction, and the mask of total reflection."""
     if event == "R":
-        mirrored = mirror_direction(ray.d, surface.normal)
-        return leave(ray, surface, mirrored, crosses=False), ~active
+        return leave(ray, surface, surface.mirrored, crosses=False), ~active
     ior = material_at(device, surface, active).ior
     bent, total = refract_direction(ray.d, surface.normal, ior, surface.entering)
     return leave(ray, surface, bent, crosses=True), active & total

@@ -110,6 +110,16 @@ def normalize(v: Any) -> Any:
     return v * dr.rcp(dr.sqrt(dr.squared_norm(v)))
 
 
+def mirror_direction(d: Any, n: Any) -> Any:
+    """r = d + 2 c n with c = -n.d (document, section 3)."""
+    return unit_again(dr.fma(-2 * dr.dot(n, d), n, d))
+
+
+def unit_again(d: Any) -> Any:
+    """Takes the rounding out of the length of a nearly unit vector, by one Newton step for 1/sqrt at 1."""
+    return d * dr.fma(-0.5, dr.squared_norm(d), 1.5)
+
+
 def select_min(a: Any, b: Any) -> Any:
     """The smaller one, b when either is NaN: one instruction, unlike `dr.minimum`, which carries NaN on."""
     return dr.select(a < b, a, b)

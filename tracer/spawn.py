@@ -11,7 +11,7 @@ from tracer.device_scene import DeviceScene
 from tracer.direct_light import Finish
 from tracer.intersection import Surface, leave
 from tracer.path import make_path
-from tracer.ray import Ray
+from tracer.ray import Ray, unit_again
 from tracer.textures.tables import TextureRow
 
 
@@ -54,16 +54,6 @@ def material_at(scene: DeviceScene, surface: Surface, active: Any) -> MaterialRo
     return MaterialRow(a.x, a.y, a.z, a.w, Finish(b.x, b.y, b.z), texture)
 
 
-def mirror_direction(d: Any, n: Any) -> Any:
-    """r = d + 2 c n with c = -n.d."""
-    return _unit_again(dr.fma(-2 * dr.dot(n, d), n, d))
-
-
-def _unit_again(d: Any) -> Any:
-    """Takes the rounding out of the length of a nearly unit vector, by one Newton step for 1/sqrt at 1."""
-    return d * dr.fma(-0.5, dr.squared_norm(d), 1.5)
-
-
 def refract_direction(d: Any, n: Any, ior: Any, entering: Any) -> tuple[Any, Any]:
     """t = eta d + (eta c - sqrt(k)) n with k = 1 - eta^2 (1 - c^2), and the mask of total reflection, k < 0.
 
@@ -72,7 +62,7 @@ def refract_direction(d: Any, n: Any, ior: Any, entering: Any) -> tuple[Any, Any
     eta = dr.select(entering, dr.rcp(ior), ior)
     c = -dr.dot(n, d)
     k = dr.fma(-eta * eta, dr.fma(-c, c, 1), 1)
-    bent = _unit_again(dr.fma(eta, d, (eta * c - dr.sqrt(k)) * n))
+    bent = unit_again(dr.fma(eta, d, (eta * c - dr.sqrt(k)) * n))
     return dr.select(ior == 1, d, bent), (k < 0) & (ior != 1)
 
 
@@ -81,7 +71,6 @@ def spawn(
 ) -> Children:
     """The children at a hit; `base` (3, n) is the throughput of the parent times own color times (1 - a)."""
     ray: Ray = path.ray
-    mirror = mirror_direction(ray.d, surface.normal)
     through, total = refract_direction(ray.d, surface.normal, material.ior, surface.entering)
     k_r, k_t = material.reflection, material.refraction
     total = active & total & (k_t > 0)
@@ -92,7 +81,7 @@ def spawn(
     deep = path.level >= scene.max_depth
     second = leave(ray, surface, through, crosses=True)
     if scene.options.tir_reflects:
-        second = dr.select(total, leave(ray, surface, mirror, crosses=False), second)
+        second = dr.select(total, leave(ray, surface, surface.mirrored, crosses=False), second)
     level = path.level + 1
     one, none = scene.backend.UInt32(1), scene.backend.UInt32(0)
 
@@ -101,7 +90,11 @@ def spawn(
 
     return Children(
         reflected=make_path(
-            scene.backend, leave(ray, surface, mirror, crosses=False), path.weight * k_r, base * k_r, level
+            scene.backend,
+            leave(ray, surface, surface.mirrored, crosses=False),
+            path.weight * k_r,
+            base * k_r,
+            level,
         ),
         refracted=make_path(scene.backend, second, path.weight * k_t, base * k_t, level),
         reflects=wants_mirror & heavy_mirror & ~deep,

@@ -11,8 +11,10 @@ import numpy as np
 import tracer
 from tracer.backends import INVALID, exact_arithmetic, find_backend
 from tracer.device_scene import DeviceScene, compile_scene
-from tracer.intersection import closest_hit, free_ray, hidden, leave, surface_at
-from tracer.ray import Segment, normalize
+from tracer.intersection import closest_hit, free_ray, leave, surface_at
+from tracer.occlusion import find_suspects, hidden
+from tracer.ray import Segment, max_abs, normalize
+from tracer.shafts import Ball, Suspects
 
 Array = np.ndarray
 
@@ -61,10 +63,19 @@ def bounce(device: DeviceScene, o: Array, d_in: Array, d_out: Array, crosses: bo
         second = closest_hit(device, onward, valid)
         met = surface_at(device, onward, second, valid)
         none = dr.zeros(device.backend.UInt32, len(o))
+        far = device.backend.opaque(length)  # a number in the kernel would be a kernel for each length
         segment = Segment(
-            onward, dr.full(device.backend.Float, length, len(o)), onward.o + length * onward.d, none, none
+            onward, dr.zeros(device.backend.Float, len(o)) + far, onward.o + far * onward.d, none, none
         )
-        blocked = hidden(device, segment, valid)
+        light = Ball(segment.light, 64 * device.backend.epsilon * max_abs(segment.light))
+        if crosses:  # no shadow ray does, but the rules of contact hold
+            surface.lit_side = -surface.lit_side
+        who = (
+            Suspects.everybody(device.backend, len(o))
+            if crosses
+            else find_suspects(device, surface, light, valid)
+        )
+        blocked = hidden(device, segment, surface, who, valid)
         dr.eval(second, met, blocked)
     first = device.host.first_primitive
 

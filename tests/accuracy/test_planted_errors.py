@@ -31,13 +31,13 @@ def inverted_eta(patch: pytest.MonkeyPatch) -> None:
 
 
 def mirror_through(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(spawn, "mirror_direction", lambda d, n: dr.fma(-1.999999 * dr.dot(n, d), n, d))
+    patch.setattr(intersection, "mirror_direction", lambda d, n: dr.fma(-1.999999 * dr.dot(n, d), n, d))
 
 
 def unnormalized_weights(patch: pytest.MonkeyPatch) -> None:
-    from tracer import light_samples
+    from tracer import light_tables
 
-    patch.setattr(light_samples.math, "fsum", lambda weights: 1.0)
+    patch.setattr(light_tables.math, "fsum", lambda weights: 1.0)
 
 
 def depth_from_the_eye(patch: pytest.MonkeyPatch) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import tracer
-from tracer import spawn
+from tracer import ray
 from tracer.backends import Backend, exact_arithmetic, find_backend
-from tracer.ray import normalize
+from tracer.ray import mirror_direction, normalize
 from tracer.textures.cells import CellRule
 
 PRECISIONS = ("single", "double")
@@ -61,7 +61,7 @@ def length_error_after_bounces(backend: Backend) -> float:
     with exact_arithmetic():
         d = normalize(vectors(backend, 3, 1000)[0])
         for bounce in range(BOUNCES):
-            d = spawn.mirror_direction(d, normalize(vectors(backend, 4 + bounce, 1000)[0]))
+            d = mirror_direction(d, normalize(vectors(backend, 4 + bounce, 1000)[0]))
             dr.eval(d)
     length = np.sqrt((d.numpy().astype(np.longdouble) ** 2).sum(axis=0))
     return float(np.abs(length - 1).max() / backend.epsilon)
@@ -71,7 +71,7 @@ def length_error_after_bounces(backend: Backend) -> float:
 def test_directions_stay_unit_from_bounce_to_bounce(precision: str, monkeypatch: pytest.MonkeyPatch) -> None:
     backend = find_backend("llvm", precision)
     assert length_error_after_bounces(backend) <= 4
-    monkeypatch.setattr(spawn, "_unit_again", lambda d: d)
+    monkeypatch.setattr(ray, "unit_again", lambda d: d)
     assert length_error_after_bounces(backend) > 20
 
 

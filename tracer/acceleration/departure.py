@@ -13,7 +13,7 @@ from that plane is noise. What decides then is geometry that is large compared w
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any
@@ -25,20 +25,27 @@ from tracer.ray import Ray, max_abs, select_max
 
 
 @dataclass
+class Ground:
+    """Where a surface lies: within `reach` of three points (a triangle: its `corners` and 0; a sphere: center
+    and radius; a plane: infinite)."""
+
+    corners: tuple[Any, ...]
+    reach: Any
+
+
+@dataclass
 class Departure:
     """What a ray knows of the surface that it leaves.
 
-    `active`: it does leave one; `primitive`: its id; `normal`: unit normal on the side of travel; `corners`,
-    `reach`: the surface lies within `reach` of the three points (a triangle: its corners and 0; a sphere:
-    center and radius; a plane: infinite); `view`: direction towards where the origin was seen from; `climb`:
-    rate at which the ray rises above the tangent plane.
+    `active`: it does leave one; `primitive`: its id; `normal`: unit normal on the side of travel; `ground`:
+    looks up where the surface lies, which few rays ask; `view`: direction towards where the origin was seen
+    from; `climb`: rate at which the ray rises above the tangent plane.
     """
 
     active: Any
     primitive: Any
     normal: Any
-    corners: tuple[Any, Any, Any]
-    reach: Any
+    ground: Callable[[], Ground]
     view: Any
     climb: Any
 
@@ -87,10 +94,11 @@ def _within_edges(triangle: Triangle, p: Any, slack: Any) -> Any:
 def _side(departure: Departure, triangle: Triangle, test: TriangleTest) -> Any:
     """Positive where the surface that is left lies on the positive side of the triangle's plane, or is seen
     from it."""
-    offsets = [corner - triangle.v0 for corner in departure.corners]
+    ground = departure.ground()
+    offsets = [corner - triangle.v0 for corner in ground.corners]
     heights = [dr.dot(triangle.normal, offset) for offset in offsets]
-    low = -_largest(-height for height in heights) - departure.reach
-    high = _largest(heights) + departure.reach
+    low = -_largest(-height for height in heights) - ground.reach
+    high = _largest(heights) + ground.reach
     slack = select_max(test.slack, test.relative_slack * _largest(max_abs(offset) for offset in offsets))
     one_sided = (low >= -slack) | (high <= slack)
     return dr.select(one_sided, low + high, dr.dot(triangle.normal, departure.view))

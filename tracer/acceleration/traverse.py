@@ -1,8 +1,4 @@
-"""Visits the triangles whose boxes a ray crosses: without a stack, since the tree is complete.
-
-After node i comes its left child 2i if the box was hit, else the next subtree: i + 1 with its trailing zeros
-stripped (the right sibling of the lowest ancestor that is a left child); back at 1 the walk is over.
-"""
+"""Visits the triangles that rays meet, nearest boxes first."""
 
 from __future__ import annotations
 
@@ -12,38 +8,15 @@ from typing import Any
 
 import drjit as dr
 
-from tracer.acceleration.build import LEAF_SLOTS
 from tracer.acceleration.departure import Departure, doubtful, meet_near_origin
-from tracer.acceleration.triangle import (
-    Triangle,
-    TriangleTest,
-    gather_triangle,
-    meet_triangle,
-    projection_axes,
-)
-from tracer.backends import INVALID, Backend
+from tracer.acceleration.triangle import Triangle, TriangleTest, meet_triangle, projection_axes
+from tracer.acceleration.walk import Node, TriangleTables, fetch_node, octant_of, walk
+from tracer.backends import Backend
 from tracer.ray import Ray, max_abs, select_max, select_min
 
 SMALLEST_COMPONENT = 1e-20
 """Direction components below this count as this: their reciprocal stays finite, the ray moves by 1e-20 of its
 way."""
-
-
-@dataclass
-class TriangleTables:
-    """All triangles of a scene and the tree over them, in Dr.Jit memory.
-
-    `triangles`: `TRIANGLE_WORDS` floats each, in file order; `boxes`: 8 floats a node; `order`: triangle of
-    each leaf slot; `primitive`: id of each triangle; `leaf_count`, `extent` (largest |coordinate|): width-1.
-    """
-
-    triangles: Any
-    boxes: Any
-    order: Any
-    primitive: Any
-    leaf_count: Any
-    extent: Any
-
 
 Visit = Callable[[Any, Any, Any, TriangleTest, Any], Any]
 """(state, distance, primitive id, the whole test, mask of a hit in front of the limit) -> state."""
@@ -53,50 +26,45 @@ def visit_triangles(
     backend: Backend,
     tables: TriangleTables,
     ray: Ray,
-    departure: Departure,
+    departure: Callable[[], Departure],
     state: Any,
     limit: Callable[[Any], Any],
     visit: Visit,
     active: Any,
 ) -> Any:
     """Calls `visit` for every triangle met, until the walk ends or `limit(state)` (a distance) falls below
-    zero."""
+    zero. What only rays that enter the root's box need, `departure()` too, is not computed for packets
+    without one."""
     slabs = _Slabs.of(backend, tables, ray)
-    axes = projection_axes(ray.d)
+    root = fetch_node(backend, tables, slabs.octant * tables.count)
 
-    def leaf(node: Any, state: Any) -> Any:
-        slot = (node - tables.leaf_count) * LEAF_SLOTS
-        previous = backend.UInt32(INVALID)
-        for k in range(LEAF_SLOTS):
-            index = dr.gather(backend.UInt32, tables.order, slot + k)
-            fresh, previous = index != previous, index  # a leaf with one triangle holds it twice
-            triangle = gather_triangle(backend, tables.triangles, index, True)
-            primitive = dr.gather(backend.UInt32, tables.primitive, index)
-            test = meet_triangle(backend.epsilon, triangle, ray, axes)
-            other = ~(departure.active & (departure.primitive == primitive))
-            t, valid = _decide(departure, ray, triangle, test, other & doubtful(departure, test))
-            state = visit(state, t, primitive, test, valid & other & fresh & (t <= limit(state)))
-        return state
+    def visit_all(state: Any) -> tuple[Any]:
+        axes, leaving = projection_axes(ray.d), departure()
 
-    def body(node: Any, state: Any) -> tuple[Any, Any]:
-        crossed = slabs.crossed(backend, tables, node, limit(state))
-        at_leaf = node >= tables.leaf_count
-        (state,) = dr.if_stmt(
-            args=(node, state),
-            cond=crossed & at_leaf,
-            true_fn=lambda node, state: (leaf(node, state),),
-            false_fn=lambda node, state: (state,),
-            label="leaf",
+        def test(triangle: Triangle, primitive: Any, state: Any) -> Any:
+            found = meet_triangle(backend.epsilon, triangle, ray, axes)
+            other = ~(leaving.active & (leaving.primitive == primitive))
+            t, valid = _decide(leaving, ray, triangle, found, other & doubtful(leaving, found))
+            return visit(state, t, primitive, found, valid & other & (t <= limit(state)))
+
+        return (
+            walk(
+                backend,
+                tables,
+                slabs.octant,
+                crosses=lambda node, state: slabs.crossed(node, limit(state)),
+                test=test,
+                done=lambda state: limit(state) < 0,
+                state=state,
+            ),
         )
-        following = node + 1
-        following = following >> dr.tzcnt(following)
-        following = dr.select(following == 1, 0, following)
-        node = dr.select(crossed & ~at_leaf, node << 1, following)
-        return dr.select(limit(state) < 0, 0, node), state
 
-    node = dr.select(active, backend.UInt32(1), 0) & dr.full(backend.UInt32, INVALID, dr.width(ray.o))
-    _, state = dr.while_loop(
-        state=(node, state), cond=lambda node, state: node != 0, body=body, label="hierarchy"
+    (state,) = dr.if_stmt(
+        args=(state,),
+        cond=active & slabs.crossed(root, limit(state)),
+        true_fn=visit_all,
+        false_fn=lambda state: (state,),
+        label="root",
     )
     return state
 
@@ -125,29 +93,30 @@ def _decide(
 
 @dataclass
 class _Slabs:
-    """A ray prepared for box tests: reciprocal direction, and its origin moved by the bound on all rounding.
+    """A ray prepared for box tests: its octant, its reciprocal direction, and the distances to planes through
+    zero for those crossed first and last, moved by the bound on all rounding.
 
     The triangle test may accept a line that misses the exact triangle by the rounding of the corners seen
     from the origin; so every box is widened by 8 eps times the largest coordinate in play.
     """
 
+    octant: Any
     inverse: Any
-    origin_low: Any
-    origin_high: Any
+    shift_first: Any
+    shift_last: Any
 
     @staticmethod
     def of(backend: Backend, tables: TriangleTables, ray: Ray) -> _Slabs:
         tiny = backend.Float(SMALLEST_COMPONENT)
         d = backend.Vector3(*(dr.select(dr.abs(c) < tiny, dr.select(c < 0, -tiny, tiny), c) for c in ray.d))
-        pad = 8 * backend.epsilon * (max_abs(ray.o) + tables.extent)
-        return _Slabs(dr.rcp(d), ray.o + pad, ray.o - pad)
+        inverse = dr.rcp(d)
+        pad = 8 * backend.epsilon * (max_abs(ray.o) + tables.extent) * dr.abs(inverse)
+        shift = -ray.o * inverse
+        return _Slabs(octant_of(backend, d), inverse, shift - pad, shift + pad)
 
-    def crossed(self, backend: Backend, tables: TriangleTables, node: Any, limit: Any) -> Any:
+    def crossed(self, node: Node, limit: Any) -> Any:
         """Mask: the ray meets the widened box of the node in 0 <= t <= limit (Kay and Kajiya, 1986)."""
-        low = dr.gather(backend.Vector4, tables.boxes, node * 2)
-        high = dr.gather(backend.Vector4, tables.boxes, node * 2 + 1)
-        a = (backend.Vector3(low.x, low.y, low.z) - self.origin_low) * self.inverse
-        b = (backend.Vector3(high.x, high.y, high.z) - self.origin_high) * self.inverse
-        near = select_max(select_max(select_min(a.x, b.x), select_min(a.y, b.y)), select_min(a.z, b.z))
-        far = select_min(select_min(select_max(a.x, b.x), select_max(a.y, b.y)), select_max(a.z, b.z))
-        return select_max(near, backend.Float(0)) <= select_min(far, limit)
+        near = dr.fma(node.first, self.inverse, self.shift_first)
+        far = dr.fma(node.last, self.inverse, self.shift_last)
+        entry = select_max(select_max(near.x, near.y), select_max(near.z, type(near.z)(0)))
+        return entry <= select_min(select_min(far.x, far.y), select_min(far.z, limit))

@@ -18,8 +18,9 @@ import drjit as dr
 from tracer.backends import Backend
 from tracer.ray import Ray, max_abs, select_max, select_min
 
-TRIANGLE_WORDS = 12
-"""Floats of a triangle in its table: three corners, unit normal (zero: degenerate, never hit)."""
+TRIANGLE_WORDS = 16
+"""Floats of a triangle in its table: three corners, unit normal (zero: degenerate, never hit), two halves of
+its primitive id (whole numbers below 2^16, exact in single precision), 2 unused."""
 
 CONTACT_SLACK = 32
 """Bound on the error of a hit point, in units of eps S: 8 across its surface, and up to 4 times that along it
@@ -45,13 +46,20 @@ class Projection:
     v: Any
 
 
-def gather_triangle(backend: Backend, table: Any, index: Any, active: Any) -> Triangle:
-    """Reads triangle `index` from the table, in packets of four floats."""
-    a, b, c = (dr.gather(backend.Vector4, table, index * 3 + k, active) for k in range(3))
+def gather_triangle(backend: Backend, table: Any, slot: Any) -> Triangle:
+    """The triangle in a slot of the hierarchy (or its vertex normals, from a table of the same layout)."""
+    return fetch_triangle(backend, table, slot)[0]
+
+
+def fetch_triangle(backend: Backend, table: Any, slot: Any) -> tuple[Triangle, Any]:
+    """The triangle in a slot of the hierarchy, and its primitive id."""
+    # Packets have 8 words at most.
+    a, b = (dr.gather(backend.FloatN, table, slot * 2 + k, shape=(8, dr.width(slot))) for k in range(2))
     vector = backend.Vector3
-    return Triangle(
-        vector(a.x, a.y, a.z), vector(a.w, b.x, b.y), vector(b.z, b.w, c.x), vector(c.y, c.z, c.w)
+    triangle = Triangle(
+        vector(a[0], a[1], a[2]), vector(a[3], a[4], a[5]), vector(a[6], a[7], b[0]), vector(b[1], b[2], b[3])
     )
+    return triangle, (backend.UInt32(b[4]) << 16) | backend.UInt32(b[5])
 
 
 def projection_axes(d: Any) -> Projection:

@@ -11,18 +11,21 @@ import numpy as np
 
 from tracer.backends import Backend
 from tracer.ray import Hit, Ray, Segment
+from tracer.shafts import Ball, ball_around
 from tracer.shapes.sphere import SphereSlot, contact_margin
 
 
 @dataclass
 class SphereTable:
-    """`rows`: 4 floats a sphere (center, radius); `margins`, `primitives`: one each; `count`: width-1."""
+    """`rows`: 4 floats a sphere (center, radius); `margins`, `primitives`: one each; `count`: width-1; `ball`
+    holds them all."""
 
     backend: Backend
     rows: Any
     margins: Any
     primitives: Any
     count: Any
+    ball: Ball
 
     @staticmethod
     def of(backend: Backend, rows: np.ndarray, primitives: np.ndarray) -> SphereTable:
@@ -33,6 +36,7 @@ class SphereTable:
             backend.table([contact_margin(row, backend.epsilon) for row in rows]),
             backend.id_table(primitives),
             backend.opaque_id(len(rows)),
+            Ball.of(backend, ball_around(_extremes(rows), backend.epsilon)),
         )
 
     def closest(self, ray: Ray, hit: Hit, active: Any) -> Hit:
@@ -69,3 +73,9 @@ class SphereTable:
             margin=dr.gather(self.backend.Float, self.margins, i),
             primitive=dr.gather(self.backend.UInt32, self.primitives, i),
         )
+
+
+def _extremes(rows: np.ndarray) -> np.ndarray:
+    """(8 n, 3) the corners of the boxes around spheres."""
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    return (rows[:, None, :3] + rows[:, None, 3:] * corners).reshape(-1, 3)

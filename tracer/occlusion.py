@@ -1,0 +1,195 @@
+"""What stands between a shaded point and a light (document, section 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import drjit as dr
+
+from tracer.acceleration.beam import CLEAR, COVERED, look_along
+from tracer.acceleration.traverse import visit_triangles
+from tracer.acceleration.triangle import TriangleTest
+from tracer.device_scene import DeviceScene
+from tracer.intersection import Surface, departure_to_light, shape_of
+from tracer.ray import Segment
+from tracer.shafts import Ball, Shaft, Suspects
+from tracer.shapes.plane import PlaneSlot
+from tracer.shapes.sphere import SphereSlot
+
+
+def find_suspects(
+    scene: DeviceScene, surface: Surface, ball: Ball, active: Any, spheres: bool = True
+) -> Suspects:
+    """Who may hide a light, whose samples the ball holds, from the points of a surface; without `spheres`
+    only the others are looked at."""
+    backend = scene.backend
+    who = Suspects.nobody(backend, dr.width(surface.p))
+    shaft = Shaft.of(backend, surface.p, ball)
+    for number, slot in enumerate(_spheres(scene) if spheres else []):
+        found = shaft.toward(slot.center, slot.radius)
+        # The sphere itself hides every light outside from a point inside it, and none that it faces outside.
+        own, inside = surface.primitive == slot.primitive, ~surface.entering
+        suspect = dr.select(own, inside, found.may_meet)
+        who.spheres |= dr.select(suspect, backend.UInt32(1 << number), 0)
+        who.umbra |= dr.select(own, inside & found.apart, found.covered)
+    if scene.sphere_table is not None:
+        around = scene.sphere_table.ball
+        who.many |= shaft.toward(around.center, around.radius).may_meet
+    if scene.triangles is not None:
+        near = active & _near_a_mesh(scene, surface, shaft)
+        if not scene.options.transparent_shadows:
+            near = near & ~who.umbra
+        verdict = look_along(backend, scene.triangles, shaft, surface.lit_side, surface.primitive, near)
+        who.meshes |= verdict != CLEAR
+        who.umbra |= verdict == COVERED
+    return who
+
+
+def _near_a_mesh(scene: DeviceScene, surface: Surface, shaft: Shaft) -> Any:
+    """Mask: the shaft may meet the ball around a mesh, and not just that of a convex mesh that it leaves."""
+    near = dr.zeros(scene.backend.Bool, dr.width(surface.p))
+    for mesh in scene.enclosures:
+        met = shaft.toward(mesh.ball.center, mesh.ball.radius).may_meet
+        if mesh.convex:
+            met = met & ~((surface.shape == mesh.shape) & surface.entering)
+        near |= met
+    return near
+
+
+def hidden(scene: DeviceScene, segment: Segment, surface: Surface, suspects: Suspects, active: Any) -> Any:
+    """Mask: some shape lies strictly between the surface and the light; of spheres and meshes only suspects
+    are asked."""
+    blocked = hidden_by_plane(scene, segment, active) | (suspects.umbra & active)
+    blocked = blocked | hidden_by_sphere(scene, segment, active & ~blocked, suspects)
+    return blocked | hidden_by_many(scene, segment, surface, suspects, active & ~blocked)
+
+
+def hidden_by_plane(scene: DeviceScene, segment: Segment, active: Any) -> Any:
+    """Mask: a plane lies strictly between the two ends."""
+    # All planes with bits in one step: those whose bits differ at the two ends.
+    blocked = ((segment.ray.sides ^ segment.light_sides) & segment.light_decided) != 0
+    for slot in scene.slots:
+        if isinstance(slot, PlaneSlot) and slot.bit is None:
+            blocked = blocked | slot.blocks(segment, active)
+    return blocked & active
+
+
+def hidden_by_sphere(
+    scene: DeviceScene, segment: Segment, active: Any, suspects: Suspects | None = None
+) -> Any:
+    """Mask: a sphere that stands in the kernel (and is suspect) lies strictly between the two ends."""
+    blocked = dr.full(scene.backend.Bool, False, dr.width(segment.length))
+    for number, slot in enumerate(_spheres(scene)):
+        if suspects is None:
+            blocked = blocked | slot.blocks(segment, active)
+        else:
+            asked = active & ~blocked & ((suspects.spheres & (1 << number)) != 0)
+            blocked = _changed_where(
+                asked, blocked, partial(lambda blocked, slot: slot.blocks(segment, True), slot=slot)
+            )
+    return blocked & active
+
+
+def hidden_by_many(
+    scene: DeviceScene, segment: Segment, surface: Surface, suspects: Suspects, active: Any
+) -> Any:
+    """Mask: a triangle, or one of many spheres, lies strictly between the two ends, where they are
+    suspects."""
+    blocked = dr.full(scene.backend.Bool, False, dr.width(segment.length))
+    if scene.sphere_table is not None:
+        blocked = scene.sphere_table.blocks(segment, active & suspects.many)
+    if scene.triangles is not None:
+        never = scene.backend.Float(-1)
+        blocked = visit_triangles(
+            scene.backend,
+            scene.triangles,
+            segment.ray,
+            lambda: departure_to_light(scene, segment.ray, surface),
+            state=blocked,
+            limit=lambda blocked: dr.select(blocked, never, segment.length),
+            visit=lambda blocked, _t, _primitive, test, valid: (
+                blocked | (valid & ~_holds_light(segment, test))
+            ),
+            active=active & suspects.meshes & ~blocked,
+        )
+    return blocked & active
+
+
+def _spheres(scene: DeviceScene) -> list[SphereSlot]:
+    return [slot for slot in scene.slots if isinstance(slot, SphereSlot)]
+
+
+def _changed_where(lanes: Any, value: Any, change: Callable[[Any], Any]) -> Any:
+    """change(value) in some lanes; packets without one skip it."""
+    (result,) = dr.if_stmt(
+        args=(value,),
+        cond=lanes,
+        true_fn=lambda value: (change(value),),
+        false_fn=lambda value: (value,),
+        label="suspect",
+    )
+    return result
+
+
+def transmittance(
+    scene: DeviceScene, segment: Segment, surface: Surface, suspects: Suspects, active: Any
+) -> Any:
+    """Share of light that arrives when every surface crossed lets k_t through (`transparent_shadows`)."""
+    backend = scene.backend
+    share = dr.select(active, backend.Float(1), 0)
+
+    def passed(share: Any, slot: Any) -> Any:
+        factor = _refraction_of(scene, slot.primitive)
+        return share * _power_0_1_2(factor, slot.crossings(segment, active))
+
+    for slot in scene.slots:
+        if isinstance(slot, PlaneSlot):
+            share = passed(share, slot)
+    for number, slot in enumerate(_spheres(scene)):
+        asked = active & ((suspects.spheres & (1 << number)) != 0)
+        share = _changed_where(asked, share, partial(passed, slot=slot))
+    if scene.sphere_table is not None:
+        share = scene.sphere_table.fold(
+            share,
+            active & suspects.many,
+            passed,
+            lambda share: share > 0,
+        )
+    if scene.triangles is not None:
+        never = backend.Float(-1)
+        share = visit_triangles(
+            backend,
+            scene.triangles,
+            segment.ray,
+            lambda: departure_to_light(scene, segment.ray, surface),
+            state=share,
+            limit=lambda share: dr.select(share > 0, segment.length, never),
+            visit=lambda share, _t, primitive, test, valid: dr.select(
+                valid & ~_holds_light(segment, test),
+                share * _crossed(_refraction_of(scene, primitive), test.owned),
+                share,
+            ),
+            active=active & suspects.meshes,
+        )
+    return share
+
+
+def _holds_light(segment: Segment, test: TriangleTest) -> Any:
+    """Mask: the light lies on the triangle's plane within rounding, so the triangle does not hide it."""
+    return dr.abs(test.height + segment.length * test.speed) <= test.slack
+
+
+def _refraction_of(scene: DeviceScene, primitive: Any) -> Any:
+    return dr.gather(scene.backend.Float, scene.surfaces, shape_of(scene, primitive, True) * 8 + 2)
+
+
+def _crossed(factor: Any, owned: Any) -> Any:
+    """The factor of a surface that is crossed; exactly on an edge only one of two neighbors counts, but an
+    opaque one always does."""
+    return dr.select(owned | (factor == 0), factor, 1)
+
+
+def _power_0_1_2(factor: Any, count: Any) -> Any:
+    return dr.select(count == 0, 1, dr.select(count == 1, factor, factor * factor))
