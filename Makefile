@@ -36,7 +36,7 @@ format: setup ## lay out the code and sort the imports
 
 clean: ## remove pictures, caches and builds
 	rm -rf out build dist .mypy_cache .pytest_cache .ruff_cache
-	find tracer reference tests benchmarks -type d -name __pycache__ -prune -exec rm -rf {} + 2>/dev/null || true
+	find tracer reference tests benchmarks scripts docs assets -type d -name __pycache__ -prune -exec rm -rf {} + 2>/dev/null || true
 
 distclean: clean ## remove the virtual environment too
 	rm -rf $(VENV)

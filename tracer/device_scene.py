@@ -11,21 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from tracer.acceleration.build import build_hierarchy
-from tracer.acceleration.layout import OCTANTS, threaded
-from tracer.acceleration.triangle import CONTACT_SLACK, TRIANGLE_WORDS
 from tracer.acceleration.walk import TriangleTables
 from tracer.backends import INVALID, Backend
 from tracer.color import decode_srgb
+from tracer.device_meshes import SmoothTables, compile_meshes, inherited, placed_meshes, source_of
 from tracer.errors import SceneError
 from tracer.light_tables import LightTables, compile_lights
 from tracer.material import Material
 from tracer.ray import SIDE_BITS
 from tracer.scene import Scene
-from tracer.shafts import Ball, Enclosure, ball_around
-from tracer.shapes import Instance, Mesh, Plane, ShapeRecord, Sphere
+from tracer.shafts import Enclosure
+from tracer.shapes import Plane, ShapeRecord, Sphere
 from tracer.shapes.sphere_table import SphereTable
-from tracer.shapes.triangles import MeshData, PlacedMesh, place_mesh, read_mesh
+from tracer.shapes.triangles import PlacedMesh
 from tracer.textures import Solid
 from tracer.textures.picture import read_picture
 from tracer.textures.tables import PackedTexture, TexturePacker, TextureTables
@@ -38,12 +36,6 @@ KIND_UNIT = 256
 UNROLLED_SPHERES = 32
 """Up to so many spheres stand in the kernel one by one; more are looped over."""
 
-SINGLE_ENCLOSURES = 8
-"""Up to so many meshes have a ball of their own around them; more share one."""
-
-LARGEST_CONVEX = 128
-"""Triangles of a mesh that is tested for being convex, at most."""
-
 
 @dataclass(frozen=True)
 class Options:
@@ -53,14 +45,6 @@ class Options:
     secondary_background: bool
     transparent_shadows: bool
     diffuse_is_lambert: bool
-
-
-@dataclass
-class SmoothTables:
-    """Unit vertex normals in rows like those of the triangles, and which shapes want them."""
-
-    normals: Any
-    shapes: Any
 
 
 @dataclass
@@ -117,7 +101,7 @@ class DeviceScene:
 def compile_scene(scene: Scene, backend: Backend) -> DeviceScene:
     """The tables of a scene; raises `SceneError` for files that cannot be used."""
     scene.check()
-    meshes = _placed_meshes(scene)
+    meshes = placed_meshes(scene)
     counts = [len(meshes[i].corners) if i in meshes else 1 for i in range(len(scene.shapes))]
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     if first[-1] >= INVALID >> 1:
@@ -126,7 +110,7 @@ def compile_scene(scene: Scene, backend: Backend) -> DeviceScene:
     host = HostScene(first, meshes, _extent(scene, rows, meshes))
     decode = decode_srgb if scene.color_space == "linear" else np.asarray
     slots, sphere_table, planes = _analytic_shapes(scene, backend, rows, first)
-    triangles, leaf_slots = _triangle_tables(backend, meshes, first) if meshes else (None, np.zeros(0, int))
+    tables = compile_meshes(scene, backend, meshes, first)
     packer = TexturePacker(scene.literal, decode, lambda file: read_picture(scene.resolve(file)))
     textures = _textures(scene, packer)
     return DeviceScene(
@@ -140,11 +124,11 @@ def compile_scene(scene: Scene, backend: Backend) -> DeviceScene:
         kinds=frozenset(_kind(shape) for shape in scene.shapes),
         slots=slots,
         sphere_table=sphere_table,
-        triangles=triangles,
-        enclosures=_enclosures(backend, meshes),
-        smooth=_smooth_tables(scene, backend, meshes, leaf_slots),
-        shape_of=backend.id_table(np.repeat(np.arange(len(counts)), counts)) if meshes else None,
-        slot_of=backend.id_table(_slot_of_primitive(counts, meshes, leaf_slots)) if meshes else None,
+        triangles=tables.triangles,
+        enclosures=tables.enclosures,
+        smooth=tables.smooth,
+        shape_of=tables.shape_of,
+        slot_of=tables.slot_of,
         geometry=backend.table(rows),
         ids=backend.id_table(_id_rows(scene, textures)),
         first_primitive=backend.id_table(first[:-1] if len(first) > 1 else [0]),
@@ -216,22 +200,10 @@ def _id_rows(scene: Scene, textures: list[PackedTexture]) -> np.ndarray:
     return rows
 
 
-def source_of(scene: Scene, shape: ShapeRecord) -> ShapeRecord:
-    """The mesh that an instance shares; every other shape itself."""
-    if not isinstance(shape, Instance):
-        return shape
-    return next(other for other in scene.shapes if other.name == shape.of)
-
-
-def _inherited(scene: Scene, shape: ShapeRecord, key: str) -> Any:
-    own = getattr(shape, key)
-    return getattr(source_of(scene, shape), key) if own is None else own
-
-
 def _surface_rows(scene: Scene, textures: list[PackedTexture]) -> np.ndarray:
     rows = np.zeros((max(1, len(scene.shapes)), 8))
     for i, (shape, texture) in enumerate(zip(scene.shapes, textures, strict=True)):
-        name = _inherited(scene, shape, "material")
+        name = inherited(scene, shape, "material")
         m = Material() if name is None else scene.materials[name]
         rows[i, :4] = m.ior, m.reflection, m.refraction, m.absorption
         rows[i, 4:] = m.diffuse, m.specular, m.shininess, texture.rate
@@ -252,92 +224,9 @@ def _textures(scene: Scene, packer: TexturePacker) -> list[PackedTexture]:
     return result
 
 
-def _placed_meshes(scene: Scene) -> dict[int, PlacedMesh]:
-    """Triangles of every mesh and instance, by shape; each file is read once."""
-    read: dict[int, MeshData] = {}
-    placed = {}
-    for i, shape in enumerate(scene.shapes):
-        mesh = source_of(scene, shape)
-        if not isinstance(mesh, Mesh):
-            continue
-        if id(mesh) not in read:
-            path = None if mesh.file is None else scene.resolve(mesh.file)
-            read[id(mesh)] = read_mesh(mesh, path, f"{scene.name}: shapes.{mesh.name or i}")
-        placed[i] = place_mesh(read[id(mesh)], shape.placement)
-        if not np.isfinite(placed[i].corners).all():
-            raise SceneError(f"{scene.name}: shapes.{shape.name or i} leaves the range of single precision")
-    return placed
-
-
-def _triangle_tables(
-    backend: Backend, meshes: dict[int, PlacedMesh], first: np.ndarray
-) -> tuple[TriangleTables, np.ndarray]:
-    """The triangles of all meshes in the order of the leaves, the tree over them, and the slot of each."""
-    corners = np.concatenate([mesh.corners for mesh in meshes.values()])
-    normals = np.concatenate([mesh.normals for mesh in meshes.values()])
-    primitives = np.concatenate([np.arange(len(mesh.corners)) + first[i] for i, mesh in meshes.items()])
-    hierarchy = build_hierarchy(corners)
-    rows = np.zeros((len(corners), TRIANGLE_WORDS))
-    rows[:, :9], rows[:, 9:12] = corners.reshape(-1, 9), normals
-    rows[:, 12], rows[:, 13] = primitives >> 16, primitives & 0xFFFF
-    nodes = threaded(hierarchy)
-    tables = TriangleTables(
-        triangles=backend.table(rows[hierarchy.order]),
-        nodes=backend.single_table(nodes),
-        count=backend.opaque_id(len(nodes) // OCTANTS),
-        extent=backend.opaque(np.abs(corners).max()),
-    )
-    return tables, np.argsort(hierarchy.order)
-
-
-def _enclosures(backend: Backend, meshes: dict[int, PlacedMesh]) -> list[Enclosure]:
-    """A ball around each mesh, or one around all of many."""
-
-    def around(points: np.ndarray, shape: int, convex: bool) -> Enclosure:
-        return Enclosure(
-            Ball.of(backend, ball_around(points, backend.epsilon)), backend.opaque_id(shape), convex
-        )
-
-    if len(meshes) > SINGLE_ENCLOSURES:
-        return [around(np.concatenate([m.corners.reshape(-1, 3) for m in meshes.values()]), INVALID, False)]
-    return [
-        around(mesh.corners.reshape(-1, 3), shape, _is_convex(mesh, backend.epsilon))
-        for shape, mesh in meshes.items()
-    ]
-
-
-def _is_convex(mesh: PlacedMesh, epsilon: float) -> bool:
-    """Whether no vertex rises above any triangle by more than rounding; large meshes are not looked at."""
-    if len(mesh.corners) > LARGEST_CONVEX:
-        return False
-    points = mesh.corners.reshape(-1, 3)
-    heights = mesh.normals @ points.T - (mesh.normals * mesh.corners[:, 0]).sum(axis=1)[:, None]
-    return bool(heights.max() <= CONTACT_SLACK / 2 * epsilon * np.abs(points).max())
-
-
-def _slot_of_primitive(counts: list[int], meshes: dict[int, PlacedMesh], slots: np.ndarray) -> np.ndarray:
-    """For each primitive the slot of its triangle (0 for planes and spheres, which never ask)."""
-    result = np.zeros(sum(counts), np.int64)
-    result[np.repeat([i in meshes for i in range(len(counts))], counts)] = slots
-    return result
-
-
-def _smooth_tables(
-    scene: Scene, backend: Backend, meshes: dict[int, PlacedMesh], slots: np.ndarray
-) -> SmoothTables | None:
-    wanted = [
-        i in meshes and bool(_inherited(scene, shape, "smooth")) for i, shape in enumerate(scene.shapes)
-    ]
-    if not any(wanted):
-        return None
-    rows = np.zeros((len(slots), TRIANGLE_WORDS))
-    rows[slots, :9] = np.concatenate([mesh.corner_normals for mesh in meshes.values()]).reshape(-1, 9)
-    return SmoothTables(backend.table(rows), backend.id_table(wanted))
-
-
 def _object_space(scene: Scene, backend: Backend) -> Any:
     """The 3x4 matrices back to object space, or None when no shape asks for them."""
-    wanted = [_inherited(scene, shape, "texture_space") == "object" for shape in scene.shapes]
+    wanted = [inherited(scene, shape, "texture_space") == "object" for shape in scene.shapes]
     if not any(wanted):
         return None
     rows = np.tile(np.eye(3, 4), (len(wanted), 1, 1))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracer.canvas import Canvas
-from tracer.device_scene import source_of
+from tracer.device_meshes import source_of
 from tracer.messages import dotted
 from tracer.scene import Scene
 from tracer.shapes import Mesh, Sphere

@@ -1,0 +1,157 @@
+"""The meshes of a scene in Dr.Jit memory: triangles, hierarchy, vertex normals, and balls around them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tracer.acceleration.build import build_hierarchy
+from tracer.acceleration.layout import OCTANTS, threaded
+from tracer.acceleration.triangle import CONTACT_SLACK, TRIANGLE_WORDS
+from tracer.acceleration.walk import TriangleTables
+from tracer.backends import INVALID, Backend
+from tracer.errors import SceneError
+from tracer.scene import Scene
+from tracer.shafts import Ball, Enclosure, ball_around
+from tracer.shapes import Instance, Mesh, ShapeRecord
+from tracer.shapes.triangles import MeshData, PlacedMesh, place_mesh, read_mesh
+
+SINGLE_ENCLOSURES = 8
+"""Up to so many meshes have a ball of their own around them; more share one."""
+
+LARGEST_CONVEX = 128
+"""Triangles of a mesh that is tested for being convex, at most."""
+
+
+@dataclass
+class SmoothTables:
+    """Unit vertex normals in rows like those of the triangles, and which shapes want them."""
+
+    normals: Any
+    shapes: Any
+
+
+@dataclass
+class MeshTables:
+    """All meshes of a scene: `triangles` with the hierarchy over them, `enclosures`: balls around meshes,
+    `smooth`: vertex normals where a shape wants them, and by primitive `shape_of` and `slot_of`, its triangle
+    in the hierarchy. Without meshes everything is None."""
+
+    triangles: TriangleTables | None = None
+    enclosures: list[Enclosure] = field(default_factory=list)
+    smooth: SmoothTables | None = None
+    shape_of: Any = None
+    slot_of: Any = None
+
+
+def compile_meshes(
+    scene: Scene, backend: Backend, meshes: dict[int, PlacedMesh], first: np.ndarray
+) -> MeshTables:
+    """The tables of placed meshes by shape; `first` (shapes + 1,): the first primitive of each shape."""
+    if not meshes:
+        return MeshTables()
+    counts = np.diff(first)
+    triangles, slots = _triangle_tables(backend, meshes, first)
+    return MeshTables(
+        triangles=triangles,
+        enclosures=_enclosures(backend, meshes),
+        smooth=_smooth_tables(scene, backend, meshes, slots),
+        shape_of=backend.id_table(np.repeat(np.arange(len(counts)), counts)),
+        slot_of=backend.id_table(_slot_of_primitive(counts, meshes, slots)),
+    )
+
+
+def source_of(scene: Scene, shape: ShapeRecord) -> ShapeRecord:
+    """The mesh that an instance shares; every other shape itself."""
+    if not isinstance(shape, Instance):
+        return shape
+    return next(other for other in scene.shapes if other.name == shape.of)
+
+
+def inherited(scene: Scene, shape: ShapeRecord, key: str) -> Any:
+    """A key of a shape, or of the mesh that it shares where it has none of its own."""
+    own = getattr(shape, key)
+    return getattr(source_of(scene, shape), key) if own is None else own
+
+
+def placed_meshes(scene: Scene) -> dict[int, PlacedMesh]:
+    """Triangles of every mesh and instance, by shape; each file is read once."""
+    read: dict[int, MeshData] = {}
+    placed = {}
+    for i, shape in enumerate(scene.shapes):
+        mesh = source_of(scene, shape)
+        if not isinstance(mesh, Mesh):
+            continue
+        if id(mesh) not in read:
+            path = None if mesh.file is None else scene.resolve(mesh.file)
+            read[id(mesh)] = read_mesh(mesh, path, f"{scene.name}: shapes.{mesh.name or i}")
+        placed[i] = place_mesh(read[id(mesh)], shape.placement)
+        if not np.isfinite(placed[i].corners).all():
+            raise SceneError(f"{scene.name}: shapes.{shape.name or i} leaves the range of single precision")
+    return placed
+
+
+def _triangle_tables(
+    backend: Backend, meshes: dict[int, PlacedMesh], first: np.ndarray
+) -> tuple[TriangleTables, np.ndarray]:
+    """The triangles of all meshes in the order of the leaves, the tree over them, and the slot of each."""
+    corners = np.concatenate([mesh.corners for mesh in meshes.values()])
+    normals = np.concatenate([mesh.normals for mesh in meshes.values()])
+    primitives = np.concatenate([np.arange(len(mesh.corners)) + first[i] for i, mesh in meshes.items()])
+    hierarchy = build_hierarchy(corners)
+    rows = np.zeros((len(corners), TRIANGLE_WORDS))
+    rows[:, :9], rows[:, 9:12] = corners.reshape(-1, 9), normals
+    rows[:, 12], rows[:, 13] = primitives >> 16, primitives & 0xFFFF
+    nodes = threaded(hierarchy)
+    tables = TriangleTables(
+        triangles=backend.table(rows[hierarchy.order]),
+        nodes=backend.single_table(nodes),
+        count=backend.opaque_id(len(nodes) // OCTANTS),
+        extent=backend.opaque(np.abs(corners).max()),
+    )
+    return tables, np.argsort(hierarchy.order)
+
+
+def _enclosures(backend: Backend, meshes: dict[int, PlacedMesh]) -> list[Enclosure]:
+    """A ball around each mesh, or one around all of many."""
+
+    def around(points: np.ndarray, shape: int, convex: bool) -> Enclosure:
+        return Enclosure(
+            Ball.of(backend, ball_around(points, backend.epsilon)), backend.opaque_id(shape), convex
+        )
+
+    if len(meshes) > SINGLE_ENCLOSURES:
+        return [around(np.concatenate([m.corners.reshape(-1, 3) for m in meshes.values()]), INVALID, False)]
+    return [
+        around(mesh.corners.reshape(-1, 3), shape, is_convex(mesh, backend.epsilon))
+        for shape, mesh in meshes.items()
+    ]
+
+
+def is_convex(mesh: PlacedMesh, epsilon: float) -> bool:
+    """Whether no vertex rises above any triangle by more than rounding; large meshes are not looked at."""
+    if len(mesh.corners) > LARGEST_CONVEX:
+        return False
+    points = mesh.corners.reshape(-1, 3)
+    heights = mesh.normals @ points.T - (mesh.normals * mesh.corners[:, 0]).sum(axis=1)[:, None]
+    return bool(heights.max() <= CONTACT_SLACK / 2 * epsilon * np.abs(points).max())
+
+
+def _slot_of_primitive(counts: np.ndarray, meshes: dict[int, PlacedMesh], slots: np.ndarray) -> np.ndarray:
+    """For each primitive the slot of its triangle (0 for planes and spheres, which never ask)."""
+    result = np.zeros(counts.sum(), np.int64)
+    result[np.repeat([i in meshes for i in range(len(counts))], counts)] = slots
+    return result
+
+
+def _smooth_tables(
+    scene: Scene, backend: Backend, meshes: dict[int, PlacedMesh], slots: np.ndarray
+) -> SmoothTables | None:
+    wanted = [i in meshes and bool(inherited(scene, shape, "smooth")) for i, shape in enumerate(scene.shapes)]
+    if not any(wanted):
+        return None
+    rows = np.zeros((len(slots), TRIANGLE_WORDS))
+    rows[slots, :9] = np.concatenate([mesh.corner_normals for mesh in meshes.values()]).reshape(-1, 9)
+    return SmoothTables(backend.table(rows), backend.id_table(wanted))
