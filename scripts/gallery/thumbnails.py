@@ -1,4 +1,4 @@
-"""Thumbnails: small scenes at their own size, larger ones 640 pixels wide, and all small enough to commit."""
+"""Pictures for the pages: small scenes at their own size, larger ones 640 pixels wide, and full size."""
 
 from __future__ import annotations
 
@@ -26,6 +26,11 @@ def thumbnail(image: NDArray[np.uint8]) -> bytes:
         image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
     exact = _webp(image, LOSSLESS)
     return exact if len(exact) <= LARGEST_LOSSLESS else _webp(image, QUALITY)
+
+
+def full_size(image: NDArray[np.uint8]) -> bytes:
+    """The same at the picture's own size."""
+    return _webp(image, QUALITY)
 
 
 def _webp(image: NDArray[np.uint8], quality: int) -> bytes:

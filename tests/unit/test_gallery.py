@@ -14,7 +14,7 @@ import pytest
 import tracer
 from scripts.gallery.__main__ import FINGERPRINTS, PAGES, make_gallery
 from scripts.gallery.depth import GRAYS, DepthScale, colors_of_the_bar, paint
-from scripts.gallery.entries import GROUPS, OTHERS, Entry, entries, fingerprint, read_entry
+from scripts.gallery.entries import DOCUMENT, GROUPS, OTHERS, Entry, entries, fingerprint, read_entry
 from scripts.gallery.pages import Exhibit, index_page, scenes_page
 from scripts.gallery.thumbnails import thumbnail, thumbnail_size
 from tracer.assets import builtin_scenes
@@ -123,6 +123,12 @@ def test_thumbnails_have_the_shape_of_the_scene(name: str) -> None:
         assert shown["alt"] and (int(shown["width"]), int(shown["height"])) == expected
 
 
+@pytest.mark.parametrize("name", DOCUMENT)
+def test_the_documents_pictures_are_there_in_full_size(name: str) -> None:
+    picture = cv2.imread(str(PAGES.parent / "images" / f"{name}.webp"))
+    assert picture is not None and picture.shape[1::-1] == tracer.load(name).camera.resolution, STALE
+
+
 def test_thumbnails_are_small() -> None:
     assert sum(file.stat().st_size for file in PAGES.glob("*.webp")) < LARGEST_TOTAL
 
@@ -164,13 +170,13 @@ def files_of(folder: Path) -> dict[str, bytes]:
 def test_the_same_scene_gives_the_same_bytes(tmp_path: Path, small_scene: Entry) -> None:
     """Rendered anew elsewhere, and from the kept render; a thumbnail that nobody needs goes."""
     first, second = tmp_path / "first", tmp_path / "second"
-    assert make_gallery([small_scene], first, tmp_path / "renders") == ["ball"]
-    assert make_gallery([small_scene], second, tmp_path / "other renders") == ["ball"]
+    assert make_gallery([small_scene], first, tmp_path / "images", tmp_path / "renders") == ["ball"]
+    assert make_gallery([small_scene], second, tmp_path / "images", tmp_path / "other renders") == ["ball"]
     made = files_of(first)
     assert sorted(made) == ["ball.depth.webp", "ball.webp", FINGERPRINTS, "index.md", "scenes.html"]
     assert files_of(second) == made
     (first / "gone.depth.webp").touch()
-    assert make_gallery([small_scene], first, tmp_path / "renders") == []
+    assert make_gallery([small_scene], first, tmp_path / "images", tmp_path / "renders") == []
     assert files_of(first) == made
     page = Page(made["scenes.html"].decode())
     assert page.scene_texts == [SMALL_SCENE]
