@@ -16,7 +16,7 @@ import pytest
 import tracer
 from tracer.assets import ASSETS, builtin_scenes
 from tracer.color import decode_srgb, encode_srgb
-from tracer.lights import LIGHT_KINDS
+from tracer.lights import LIGHT_KINDS, PointLight
 from tracer.records import Record
 from tracer.scene import AffineImage, Checker, Image, Mesh, Stripes
 from tracer.scene.toml_files import read_toml
@@ -110,11 +110,26 @@ def test_furnace_is_exactly_white() -> None:
     assert np.abs(color - 1).max() <= 4 * 2.0**-24
 
 
+def test_middle_of_the_mirror_ball() -> None:
+    """The ray along the axis comes straight back and meets the yellow ball behind the eye."""
+    scene = tracer.load("optics_mirror")
+    path = tracer.trace_path(scene, [[0, 1.2, 6]], [[0, 0, -1]], "RR")
+    np.testing.assert_allclose(path.position[0, 0], [0, 1.2, 1.2], atol=1e-12)
+    np.testing.assert_allclose(path.direction[0, 0], [0, 0, 1], atol=1e-12)
+    assert [scene.shapes[number].name for number in path.shape[0]] == ["ball", "yellow ball"]
+    np.testing.assert_allclose(path.position[0, 1], [0, 1.2, 9 - math.sqrt(2**2 - 0.8**2)], rtol=1e-12)
+
+
 def test_mirror_box_ends_by_depth() -> None:
-    """Perfect mirrors never lose weight: every path that meets no ball ends by the cap of 16."""
-    stats = tracer.render(tracer.load("optics_mirror_box"), supersample=1).stats
+    """Perfect mirrors never lose weight: every path that meets no ball and no floor ends by the cap of 16."""
+    scene = tracer.load("optics_mirror_box")
+    stats = tracer.render(scene, supersample=1).stats
     assert stats["deepest_level"] == 16
     assert stats["ended_by_depth"] > 0 and stats["ended_by_cutoff"] == 0
+    path = tracer.trace_path(scene, [[0.0, 3.0, 3.0]], [[0.0, 0.6, -0.8]], "R" * 16)
+    np.testing.assert_allclose(path.position[0, :, 2], [-2, 4] * 8, atol=1e-12)
+    # A rise of 0.6 for every 0.8 of the way between the mirrors: 9 for the 12 of a pair.
+    np.testing.assert_allclose(path.position[0, 2:, 1] - path.position[0, :-2, 1], 9, rtol=1e-12)
 
 
 def test_window_of_total_reflection() -> None:
@@ -129,20 +144,43 @@ def test_window_of_total_reflection() -> None:
     np.testing.assert_allclose(out[:, 0], 1.333 * np.sin(angles[:50]), atol=1e-14)
 
 
+def test_the_window_is_a_circle_in_the_picture() -> None:
+    """Along the middle column and row the sky's color ends at tan(48.6)/tan(55) of half the height."""
+    name = "optics_total_reflection"
+    blue, black = (
+        tracer.render(tracer.load(name, overrides={"background": color}), supersample=1).color
+        for color in ("#90c0f0", "#000000")
+    )
+    radius = math.tan(math.asin(1 / 1.333)) / math.tan(math.radians(55)) * 120
+    assert 2 * radius / 240 == pytest.approx(0.794, abs=5e-4)
+    seen = (blue != black).any(axis=2)
+    column, row = np.flatnonzero(seen[:, 160]), np.flatnonzero(seen[120])
+    assert (column[0], column[-1]) == pytest.approx((119.5 - radius, 119.5 + radius), abs=1)
+    assert (row[0], row[-1]) == pytest.approx((159.5 - radius, 159.5 + radius), abs=1)
+
+
 def test_ring_gives_25_visibilities() -> None:
     """24 samples of one weight: below the light the floor's brightness takes steps of 1/24."""
     scene = tracer.load("light_ring")
     assert len(scene.lights) == 1
     result = tracer.render(scene, supersample=1, precision="double")
     darkest = result.color[result.depth > 0][:, 0].min()
-    assert darkest == pytest.approx(0.2 * 0xC0 / 255, rel=1e-12)  # the ball's shade: the ambient share
+    assert darkest == pytest.approx(0.3 * 0xC0 / 255, rel=1e-12)  # the ball's shade: the ambient share
 
 
-def test_transparent_shadows_of_ball_and_pane() -> None:
-    """Straight through the ball's middle: k_t^2 = 0.49 of the light; through the pane: 0.7."""
-    scene = tracer.load("option_transparent_shadows")
-    light = np.array([0.0, 6.0, 2.0])
-    for inside, share in ((np.array([-0.9, 0.9, 0.0]), 0.49), (np.array([1.0, 0.9, 0.0]), 0.7)):
+@pytest.mark.parametrize(
+    ("name", "places"),
+    [
+        ("option_transparent_shadows", [((-0.9, 0.9, 0.0), 0.7**2), ((1.0, 0.9, 0.0), 0.7)]),
+        ("optics_glass", [((0.0, 1.0, 0.0), 0.95**2)]),
+    ],
+)
+def test_light_through_glass(name: str, places: list[tuple[tuple[float, float, float], float]]) -> None:
+    """Straight through the middle of a ball k_t^2 of the light reaches the floor, through the pane k_t."""
+    scene = tracer.load(name)
+    assert isinstance(scene.lights[0], PointLight)
+    light = np.array(scene.lights[0].position)
+    for inside, share in places:
         floor = light + (inside - light) * light[1] / (light[1] - inside[1])
         straight = light - floor
         cosine = straight[1] / np.linalg.norm(straight)
@@ -167,7 +205,9 @@ def test_transparent_shadows_of_ball_and_pane() -> None:
 def test_linear_ambient_share() -> None:
     """In the shade the floor is encode(0.2 decode(color))."""
     scene = tracer.load("option_linear")
-    scene.lights[0].position = (4.0, -6.0, 5.0)
+    for light in scene.lights:
+        assert isinstance(light, PointLight)
+        light.position = (4.0, -6.0, 5.0)
     color = tracer.render(scene, supersample=1, precision="double").color[-1, 0]
     floor = np.array([0xD8, 0xD4, 0xC8]) / 255
     np.testing.assert_allclose(color, encode_srgb(0.2 * decode_srgb(floor)), rtol=1e-12)
