@@ -11,6 +11,7 @@ import click
 from tracer.cli.classic import classic
 from tracer.cli.compare import compare
 from tracer.cli.doctor import doctor
+from tracer.cli.export import export
 from tracer.cli.failures import BROKEN_PIPE, report
 from tracer.cli.info import info
 from tracer.cli.interruption import Interruption
@@ -42,7 +43,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (render, classic, scenes, info, compare, doctor):
+for _command in (render, classic, scenes, info, compare, export, doctor):
     cli.add_command(_command)
 
 
