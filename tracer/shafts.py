@@ -103,7 +103,8 @@ class Shaft:
         # NaN, for a point inside one of the balls, is not smaller: it may meet.
         may_meet = ~(dr.fma(self.radius, radius, along) + slack < product)
         gap = dr.fma(-2, along, self.size + size) - dr.square(self.radius + radius)
-        apart = gap > 4 * slack
+        # Wide enough for the margin of a light on the sphere (`contact_margin`), too, which grows with r^2.
+        apart = gap > 4 * dr.fma(epsilon * CONTACT_REACH, size, self.slack)
         # The square roots come from below; what they lack is the root of what their squares lack.
         lack = (8 * math.sqrt(epsilon)) * (self.size + size)
         wider = dr.square(radius) * self.size > dr.square(self.radius) * size  # beta > alpha

@@ -77,9 +77,10 @@ def _meet(backend: Backend, triangle: Triangle, shaft: Shaft, normal: Any) -> An
     before, behind = height > slack, height < -slack
     same_side = (before & (other > reach)) | (behind & (other < -reach))
     crosses = (before & (other < -reach)) | (behind & (other > reach))
-    # The planes through the apex and an edge, turned so that the triangle lies on their positive side.
+    # The planes through the apex and an edge, turned so that the triangle lies on their positive side. The
+    # height tells to which: a . (b x c) = -2 area height, but its own sign is noise for a sliver.
     faces = (dr.cross(b, c), dr.cross(c, a), dr.cross(a, b))
-    turned = dr.select(dr.dot(faces[0], a) < 0, backend.Float(-1), 1)
+    turned = dr.select(before, backend.Float(-1), 1)
     edge_slack = 4 * slack * size * max_abs(shaft.axis)
     outside, inside = dr.full(backend.Bool, False, dr.width(a)), crosses
     for face in faces:

@@ -1,0 +1,359 @@
+"""The hierarchy over triangles: its form, its layout for kernels, and the same nearest hits as without it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import tracer
+from tests.accuracy.probe import directions, rotation, unit
+from tests.accuracy.worlds import icosphere
+from tracer import device_meshes
+from tracer.acceleration.build import LARGEST_LEAF, Hierarchy, build_hierarchy
+from tracer.acceleration.layout import NODE_WORDS, OCTANTS, threaded
+
+Array = np.ndarray
+
+
+def soup(seed: int, count: int, size: float = 0.3) -> Array:
+    """Triangles (m, 3, 3) in a cube of edge 2, in single precision numbers."""
+    rng = np.random.default_rng(seed)
+    sizes = size * 10.0 ** rng.uniform(-2, 0, (count, 1, 1))
+    return single(rng.uniform(-1, 1, (count, 1, 3)) + sizes * rng.normal(size=(count, 3, 3)))
+
+
+def single(corners: Array) -> Array:
+    return corners.astype(np.float32).astype(np.float64)
+
+
+def flat(axis: int) -> Array:
+    corners = soup(3, 100)
+    corners[..., axis] = 0.25
+    return corners
+
+
+def sorted_apart() -> Array:
+    """Distances that double from one triangle to the next: as unbalanced as a tree can be."""
+    return single(soup(5, 200) * 1e-3 + 2.0 ** np.arange(-100, 100)[:, None, None])
+
+
+MESHES: dict[str, Callable[[], Array]] = {
+    "one": lambda: soup(1, 1),
+    "two": lambda: soup(1, 2),
+    "three": lambda: soup(1, 3),
+    "leaf and one": lambda: soup(1, LARGEST_LEAF + 1),
+    "soup": lambda: soup(2, 1000),
+    "same triangle": lambda: np.repeat(soup(1, 1), 50, axis=0),
+    "pairs": lambda: np.repeat(soup(1, 40), 2, axis=0),
+    "same centroid": lambda: single(np.arange(1, 31)[:, None, None] * [[1.0, 0, 0], [-1, 1, 0], [0, -1, 0]]),
+    "points": lambda: np.repeat(soup(4, 60)[:, :1], 3, axis=1),
+    "one point": lambda: np.full((20, 3, 3), 0.5),
+    "collinear": lambda: single(np.arange(90).reshape(30, 3)[..., None] * np.array([0.1, 0.2, -0.3])),
+    **{f"flat in {'xyz'[axis]}": (lambda axis=axis: flat(axis)) for axis in range(3)},
+    "huge": lambda: single(soup(2, 200) * 1e30),
+    "tiny": lambda: single(soup(2, 200) * 1e-30),
+    "smallest": lambda: single(soup(2, 200) * 1e-44),
+    "far": lambda: single(soup(2, 200) + 1e6),
+    "doubling": sorted_apart,
+    "icosphere": lambda: single((lambda mesh: mesh[0][mesh[1]])(icosphere(3))),
+}
+
+
+def built(name: str) -> tuple[Array, Hierarchy]:
+    corners = MESHES[name]()
+    return corners, build_hierarchy(corners)
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_each_triangle_is_in_one_leaf(name: str) -> None:
+    corners, tree = built(name)
+    leaves = np.flatnonzero(tree.left == 0)
+    places = np.concatenate([np.arange(tree.first[k], tree.first[k] + tree.count[k]) for k in leaves])
+    assert np.array_equal(np.sort(places), np.arange(len(corners)))
+    assert np.array_equal(np.sort(tree.order), np.arange(len(corners)))
+    assert tree.count[leaves].min() >= 1
+    assert tree.count[leaves].max() <= LARGEST_LEAF <= 7  # what three bits of the layout hold
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_boxes_hold_children_and_triangles_and_are_tight(name: str) -> None:
+    corners, tree = built(name)
+    for node in range(len(tree.left)):
+        own = corners[tree.order[tree.first[node] : tree.first[node] + tree.count[node]]].reshape(-1, 3)
+        assert np.array_equal(tree.lower[node], own.min(axis=0))
+        assert np.array_equal(tree.upper[node], own.max(axis=0))
+    inner = np.flatnonzero(tree.left)
+    children = tree.left[inner]
+    assert np.array_equal(tree.count[inner], tree.count[children] + tree.count[children + 1])
+    assert np.array_equal(tree.first[children], tree.first[inner])
+    assert np.array_equal(tree.first[children + 1], tree.first[inner] + tree.count[children])
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_parents_come_first_and_levels_end_where_they_say(name: str) -> None:
+    _, tree = built(name)
+    inner = np.flatnonzero(tree.left)
+    children = np.concatenate([tree.left[inner], tree.left[inner] + 1])
+    assert np.array_equal(np.sort(children), np.arange(1, len(tree.left)))
+    depth = np.zeros(len(tree.left), int)
+    for node in inner:
+        assert tree.left[node] > node
+        depth[tree.left[node] : tree.left[node] + 2] = depth[node] + 1
+    assert np.array_equal(np.cumsum(np.bincount(depth)), tree.levels)
+
+
+def test_the_tree_is_not_deep() -> None:
+    assert len(built("soup")[1].levels) <= 25
+    assert len(built("same triangle")[1].levels) <= 6
+    assert len(built("doubling")[1].levels) <= 60
+
+
+def walked(nodes: Array, octant: int, crosses: Callable[[Array], bool]) -> list[int]:
+    """The nodes that a kernel visits, by place in the table."""
+    count = len(nodes) // OCTANTS
+    bits = nodes.view(np.uint32)
+    node, end, visited = octant * count, (octant + 1) * count, []
+    while node < end:
+        visited.append(node)
+        goes_in = crosses(nodes[node]) and bits[node, 7] == 0
+        node = node + 1 if goes_in else int(bits[node, 3])
+    assert node == end
+    return visited
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_a_walk_through_all_boxes_meets_each_leaf_once(name: str) -> None:
+    corners, tree = built(name)
+    nodes = threaded(tree)
+    assert nodes.shape == (OCTANTS * len(tree.left), NODE_WORDS) and nodes.dtype == np.float32
+    for octant in range(OCTANTS):
+        visited = walked(nodes, octant, lambda _: True)
+        assert visited == list(range(octant * len(tree.left), (octant + 1) * len(tree.left)))
+        leaves = [int(word) for word in nodes.view(np.uint32)[visited, 7] if word]
+        slots = [slot for word in leaves for slot in range(word >> 3, (word >> 3) + (word & 7))]
+        assert sorted(slots) == list(range(len(corners)))
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_a_walk_that_misses_the_root_ends_there(name: str) -> None:
+    _, tree = built(name)
+    nodes = threaded(tree)
+    for octant in range(OCTANTS):
+        assert walked(nodes, octant, lambda _: False) == [octant * len(tree.left)]
+
+
+@pytest.mark.parametrize("name", ["soup", "flat in y", "icosphere", "doubling", "pairs"])
+def test_a_missed_box_is_left_out_with_all_below_it_and_nothing_else(name: str) -> None:
+    """Any one box missed: the triangles below it are left out, in every octant."""
+    corners, tree = built(name)
+    nodes = threaded(tree)
+    rng = np.random.default_rng(1)
+    for node in rng.integers(len(tree.left), size=4):
+        box = np.array([tree.lower[node], tree.upper[node]], np.float32)
+        same = ((tree.lower == tree.lower[node]) & (tree.upper == tree.upper[node])).all(axis=1)
+        left_out = np.zeros(len(corners), bool)
+        for other in np.flatnonzero(same):
+            left_out[tree.first[other] : tree.first[other] + tree.count[other]] = True
+        for octant in range(OCTANTS):
+            planes = np.sort(box, axis=0)[[0, 1]]
+            negative = np.array([octant >> k & 1 for k in range(3)], bool)
+            first, last = np.where(negative, planes[::-1], planes)
+            missed = np.concatenate([first, last])
+
+            def crosses(words: Array, missed: Array = missed) -> bool:
+                return not np.array_equal(words[[0, 1, 2, 4, 5, 6]], missed)
+
+            visited = [k for k in walked(nodes, octant, crosses) if crosses(nodes[k])]
+            words = nodes.view(np.uint32)[visited, 7]
+            slots = [slot for word in words for slot in range(word >> 3, (word >> 3) + (word & 7))]
+            assert np.array_equal(np.sort(slots), np.flatnonzero(~left_out))
+
+
+def test_rays_of_an_octant_meet_the_nearer_child_first() -> None:
+    """Two heaps far apart: whichever an octant's rays meet first comes first in its list."""
+    for axis in range(3):
+        corners = np.concatenate([soup(1, 20), soup(2, 20) + 10.0 * np.eye(3)[axis]])
+        tree = build_hierarchy(single(corners))
+        nodes = threaded(tree)
+        for octant in range(OCTANTS):
+            second = nodes[octant * len(tree.left) + 1]
+            near_origin = min(second[axis], second[4 + axis]) < 5
+            assert near_origin == (octant >> axis & 1 == 0)
+
+
+# ---- Nearest hits ------------------------------------------------------------------------------------------
+
+
+def scene_of(corners: Array) -> tracer.Scene:
+    faces = np.arange(3 * len(corners)).reshape(-1, 3).tolist()
+    return tracer.load(
+        {"shapes": [{"kind": "mesh", "vertices": corners.reshape(-1, 3).tolist(), "faces": faces}]}
+    )
+
+
+def nearest(corners: Array, o: Array, d: Array) -> tuple[Array, Array, Array]:
+    """By every triangle's test (Moeller, Trumbore, 1997) in double precision: distances, triangles (-1:
+    none), and mask of the rays whose answer no rounding can change.
+
+    A ray is clear when it passes all triangles that could count well inside or outside of their edges.
+    """
+    edges = [corners[:, (k + 1) % 3] - corners[:, k] for k in range(3)]
+    normal = np.cross(edges[0], -edges[2])
+    size2 = sum((edge**2).sum(axis=1) for edge in edges)
+    t, number, clear = np.full(len(o), np.inf), np.full(len(o), -1), np.ones(len(o), bool)
+    second = np.full(len(o), np.inf)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for k in range(len(corners)):
+            speed = d @ normal[k]
+            sides = []
+            for j in range(3):
+                a, b = corners[k, j] - o, corners[k, (j + 1) % 3] - o
+                sides.append((np.cross(a, b) * d).sum(axis=1))
+            distance = ((corners[k, 0] - o) @ normal[k]) / speed
+            low, high = np.min(sides, axis=0), np.max(sides, axis=0)
+            reach = np.sqrt(((corners[k] - o[:, None]) ** 2).sum(axis=2)).max(axis=1) * np.sqrt(size2[k])
+            touched = (low >= -CLEARANCE * reach) | (high <= CLEARANCE * reach)
+            inside = (low > CLEARANCE * reach) | (high < -CLEARANCE * reach)
+            flat_on = np.abs(speed) < 1e-2 * np.linalg.norm(normal[k])
+            clear &= ~touched | (inside & ~flat_on)
+            valid = inside & (distance > 0)
+            second = np.where(valid, np.minimum(second, np.maximum(t, distance)), second)
+            nearer = valid & (distance < t)
+            t, number = np.where(nearer, distance, t), np.where(nearer, k, number)
+        clear &= ~(np.isfinite(t) & np.isfinite(second)) | (second - t > 1e-4 * (t + np.abs(o).max()))
+    return t, number, clear
+
+
+CLEARANCE = 1e-5
+"""How far from an edge, in shares of size and distance, a ray must pass for rounding to have no say."""
+
+
+def rays(seed: int, n: int, corners: Array) -> tuple[Array, Array]:
+    """Random ones, and half of them along an axis or in a plane of two: components that are 0 and -0."""
+    rng = np.random.default_rng(seed)
+    middle, size = corners.mean(axis=(0, 1)), np.ptp(corners, axis=(0, 1)).max()
+    target = corners[rng.integers(len(corners), size=n)].mean(axis=1)
+    d = directions(rng, n)
+    grazing = rng.random(n) < 0.2
+    d[grazing, 1] *= 1e-3
+    zero = (rng.random((n, 3)) < 0.5) & (rng.random((n, 1)) < 0.5)
+    zero[zero.all(axis=1)] = False
+    d = np.where(zero, np.where(rng.random((n, 3)) < 0.5, 0.0, -0.0), unit(d))
+    o = target - unit(d) * size * rng.uniform(0, 2, (n, 1))
+    random = rng.random(n) < 0.2
+    o[random] = middle + size * rng.uniform(-1, 1, (int(random.sum()), 3))
+    return single(o), d
+
+
+def compare_with_all(corners: Array, seed: int, n: int, precision: str) -> None:
+    o, d = rays(seed, n, corners)
+    hits = tracer.intersect(scene_of(corners), o, d, precision=precision)
+    t, number, clear = nearest(corners, o, unit(d))
+    assert clear.mean() > 0.5
+    assert (number[clear] >= 0).mean() > 0.2
+    wrong = clear & (hits.primitive != number)
+    assert not wrong.any(), f"{int(wrong.sum())} of {n}: from {o[wrong][0]} along {d[wrong][0]}"
+    hit = clear & (number >= 0)
+    bound = {"single": 1e-4, "double": 1e-11}[precision] * (np.abs(o).max() + np.abs(corners).max())
+    assert np.abs(hits.t[hit] - t[hit]).max() <= bound
+
+
+RAY_MESHES: dict[str, Callable[[], Array]] = {
+    "soup": lambda: soup(6, 60, 1.0),
+    "flat": lambda: np.concatenate([flat(axis)[:20] * 2 for axis in range(3)]),
+    "huge": lambda: single(soup(7, 40, 1.0) * 1e15),
+    "tiny": lambda: single(soup(7, 40, 1.0) * 1e-15),
+    "two": lambda: soup(9, 2, 1.0),
+}
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+@pytest.mark.parametrize("name", RAY_MESHES)
+def test_nearest_hits_are_those_of_all_triangles(name: str, precision: str) -> None:
+    compare_with_all(RAY_MESHES[name](), 3, 4000, precision)
+
+
+@pytest.mark.parametrize("scale", [1e30, 1e-30])
+def test_nearest_hits_at_the_ends_of_single_precision(scale: float) -> None:
+    compare_with_all(single(soup(7, 40, 1.0) * scale), 3, 4000, "double")
+
+
+def jump_too_far(nodes: Array) -> None:
+    """Every other jump skips a node more."""
+    bits, count = nodes.view(np.uint32), len(nodes) // OCTANTS
+    ends = (np.arange(len(bits)) // count + 1) * count
+    bits[:, 3] = np.minimum(bits[:, 3] + bits[:, 3] % 2, ends)
+
+
+def boxes_too_small(nodes: Array) -> None:
+    nodes[:, 0:3] += 0.01 * (nodes[:, 4:7] - nodes[:, 0:3])
+
+
+def planes_swapped(nodes: Array) -> None:
+    nodes[:, [0, 4]] = nodes[:, [4, 0]]
+
+
+def leaf_one_short(nodes: Array) -> None:
+    bits = nodes.view(np.uint32)
+    bits[:, 7] -= (bits[:, 7] & 7) > 1
+
+
+@pytest.mark.parametrize("damage", [jump_too_far, boxes_too_small, planes_swapped, leaf_one_short])
+def test_planted_error_is_caught(damage: Callable[[Array], None], monkeypatch: pytest.MonkeyPatch) -> None:
+    def damaged(tree: Hierarchy) -> Array:
+        nodes = threaded(tree)
+        damage(nodes)
+        return nodes
+
+    monkeypatch.setattr(device_meshes, "threaded", damaged)
+    with pytest.raises(AssertionError):
+        compare_with_all(RAY_MESHES["soup"](), 3, 4000, "double")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_nearest_hits_of_many_soups(precision: str) -> None:
+    for seed in range(12):
+        compare_with_all(soup(seed, 120, 1.0), seed, 6000, precision)
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_the_order_in_the_file_makes_no_difference(precision: str) -> None:
+    """Of equal distances the lower primitive counts; what is hit, and where, is the same in any order."""
+    rng = np.random.default_rng(2)
+    vertices, faces = icosphere(2)
+    corners = single((vertices @ rotation(rng).T)[faces])
+    corners = np.concatenate([corners, corners[::3], single(corners * [1, 0.5, 1])])
+    o, d = rays(5, 20_000, corners)
+    first = tracer.intersect(scene_of(corners), o, d, precision=precision)
+    assert first.valid.mean() > 0.5
+    for _ in range(3):
+        shuffled = rng.permutation(len(corners))
+        again = tracer.intersect(scene_of(corners[shuffled]), o, d, precision=precision)
+        assert np.array_equal(first.t, again.t)
+        assert np.array_equal(first.valid, again.valid)
+        # Where the primitive is another one, both were met at the same distance: twins, or a shared edge.
+        hit = first.valid
+        mine, theirs = corners[first.primitive[hit]], corners[shuffled][again.primitive[hit]]
+        same = (mine == theirs).all(axis=(1, 2))
+        assert same.mean() > 0.99
+        lowest = {corner.tobytes(): k for k, corner in reversed(list(enumerate(corners)))}
+        twins = [lowest[corner.tobytes()] for corner in mine]
+        assert np.array_equal(np.array(twins), first.primitive[hit])
+
+
+def test_a_ray_along_a_flat_box_and_exactly_between_two() -> None:
+    """Boxes without thickness are entered by rays that run in their plane next to another triangle."""
+    wall = np.array([[[0, 0, 0], [0, 2, 0], [0, 0, 2]], [[0, 2, 2], [0, 0, 2], [0, 2, 0]]], float)
+    target = np.array([[[-1, 3, -1], [1, 3, -1], [0, 3, 3]]], float)
+    for precision in ("single", "double"):
+        hits = tracer.intersect(
+            scene_of(np.concatenate([wall, target])),
+            [[0, -1, 0.5], [0.0, -1, 0.5], [-1, 0.5, 0.5]],
+            [[0.0, 1, 0], [-0.0, 1, -0.0], [1, 0.0, -0.0]],
+            precision=precision,
+        )
+        assert hits.primitive.tolist() == [2, 2, 0]
+        assert hits.t.tolist() == [4.0, 4.0, 1.0]
