@@ -52,6 +52,15 @@ TOLERANCES: dict[str, Tolerance] = {
     "differing rays": Tolerance(
         0.002, "share", "single: a ray whose branch rounding decides may be counted otherwise", "measured"
     ),
+    "color, Mitsuba": Tolerance(
+        1e-4, "display value", "the tolerance of single precision, which both pictures are made in", "9"
+    ),
+    "grazing pixels": Tolerance(
+        0.01,
+        "share",
+        "differ, and move with rounding of the canvas or with where the reference starts secondary rays",
+        "measured",
+    ),
     "white": Tolerance(
         4, "ulp of 1", "shares w / sum w, the sum of D and H, and a + (1-a) x round once each", "2"
     ),
@@ -76,8 +85,8 @@ TOLERANCES: dict[str, Tolerance] = {
     "grazing band": Tolerance(
         16,
         "eps S",
-        "clearance of a ray from a silhouette, an edge or a tie: o, d, center and radius are rounded once each "
-        "on either side, and the closest approach adds 6 products",
+        "clearance of a ray from a silhouette, an edge or a tie: o, d, center and radius are rounded once "
+        "each on either side, and the closest approach adds 6 products",
         "4, 5",
     ),
     "grazing rays": Tolerance(
@@ -106,6 +115,59 @@ TOLERANCES: dict[str, Tolerance] = {
         8,
         "eps S / (r cos), flat: eps |e1||e2| / |e1 x e2|",
         "dp / r for spheres; a cross product and its length for triangles; measured 2.2",
+        "measured",
+    ),
+    "camera": Tolerance(
+        16,
+        "eps S, eps",
+        "o = K + x X + y Y and d = unit(dis f + x X + y Y): 3 products each, S of the canvas",
+        "7",
+    ),
+    "mitsuba camera": Tolerance(
+        8,
+        "eps S, eps",
+        "fov, frame and principal point are rounded once each, the sample goes through a 4 x 4 matrix; "
+        "measured 3.2",
+        "measured",
+    ),
+    "depth buffer": Tolerance(
+        16, "eps S", "|dt cos|, camera ray and hit together, 8 each; measured 4.0 in single precision", "7"
+    ),
+    "mitsuba depth buffer": Tolerance(
+        16,
+        "eps S",
+        "|dt cos|: 8 of the hit, and 8 of the camera ray, whose near plane is taken off t; measured 4.7",
+        "measured",
+    ),
+    "mirror": Tolerance(
+        16, "eps (1 + 2 S / r)", "5 products; a normal known to eps S / r turns the ray twice as far", "3"
+    ),
+    "refraction": Tolerance(
+        16,
+        "eps (1 + (eta + eta^2) / sqrt k + (S / r) g (1 + eta / sqrt k)), g = |eta c - sqrt k|",
+        "sqrt k loses eps eta^2 / sqrt k near total reflection; a normal known to eps S / r changes the ray "
+        "by g (1 + eta / sqrt k) times that",
+        "3",
+    ),
+    "mitsuba direction": Tolerance(
+        16,
+        "as mirror and refraction, at the same normal",
+        "into the frame of the normal and out of it, 6 products each way",
+        "measured",
+    ),
+    "total reflection band": Tolerance(
+        16, "eps (1 + eta^2) (1 + 2 S / r)", "rounding of k = 1 - eta^2 (1 - c^2) and of the normal", "3"
+    ),
+    "next vertex": Tolerance(
+        16, "eps S", "|dt cos| from the vertex and direction that our chain reports, taken at their word", "5"
+    ),
+    "mitsuba next vertex": Tolerance(
+        8, "eps S", "|dt cos|: one hit from a start of its own, as for primary rays", "measured"
+    ),
+    "chain growth": Tolerance(
+        16,
+        "eps S / cos times the gain of the bounces, 1 + 2 t / (r cos) each",
+        "median over chains that run freely; each side adds the error of one hit a vertex",
         "measured",
     ),
 }

@@ -1,0 +1,50 @@
+"""`tracer export`: a scene for another renderer."""
+
+from __future__ import annotations
+
+import click
+
+from tracer.cli.failures import talk
+from tracer.cli.options import scene_options
+
+
+@click.command("export", short_help="Write a scene for another renderer.")
+@click.argument("scene")
+@click.option("--to", "renderer", type=click.Choice(("mitsuba",)), required=True, help="The other renderer.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    default="{name}.xml",
+    show_default=True,
+    help="The file; meshes and pictures go beside it. {name} is the scene's name.",
+)
+@click.option("--scale", type=float, default=1.0, metavar="S", help="Size against the scene's resolution.")
+@scene_options
+def export(
+    scene: str, renderer: str, output: str, scale: float, overrides: tuple[str, ...], allow_outside: bool
+) -> None:
+    """Write SCENE, a .toml file or a built-in name, for another renderer.
+
+    Geometry and camera are the same there. Lights and materials are as near as that renderer comes; what has
+    no counterpart is said here and at the top of the file.
+
+    \b
+    Examples:
+      tracer export classic --to mitsuba -o classic.xml
+      mitsuba -m llvm_ad_rgb -Dspp=256 classic.xml
+    """
+    from tracer.film.atomic import check_writable, fill_template
+    from tracer.scene import load
+    from tracer.settings import Settings, picture_canvas
+
+    settings = Settings(scale=scale).checked()
+    loaded = load(scene, allow_outside=allow_outside, overrides=overrides)
+    file = fill_template(output, loaded.name)
+    check_writable(file, (".xml",))
+    from reference.mitsuba_xml import export_mitsuba
+
+    exported = export_mitsuba(loaded, file, picture_canvas(loaded, settings))
+    for remark in exported.remarks:
+        talk(f"{loaded.name}: {remark}")
+    click.echo(", ".join([file, *(piece.name for piece in exported.pieces)]))
