@@ -131,12 +131,15 @@ def _enclosures(backend: Backend, meshes: dict[int, PlacedMesh]) -> list[Enclosu
 
 
 def is_convex(mesh: PlacedMesh, epsilon: float) -> bool:
-    """Whether no vertex rises above any triangle by more than rounding; large meshes are not looked at."""
-    if len(mesh.corners) > LARGEST_CONVEX:
+    """Whether no triangle rises above another by more than the rounding of its own coordinates, which shadow
+    rays do not notice (`CONTACT_SLACK`); large meshes are not looked at."""
+    n = len(mesh.corners)
+    if n > LARGEST_CONVEX:
         return False
-    points = mesh.corners.reshape(-1, 3)
-    heights = mesh.normals @ points.T - (mesh.normals * mesh.corners[:, 0]).sum(axis=1)[:, None]
-    return bool(heights.max() <= CONTACT_SLACK / 2 * epsilon * np.abs(points).max())
+    planes = (mesh.normals * mesh.corners[:, 0]).sum(axis=1)
+    rises = (mesh.normals @ mesh.corners.reshape(-1, 3).T - planes[:, None]).reshape(n, n, 3).max(axis=2)
+    reach = np.abs(mesh.corners).max(axis=(1, 2))
+    return bool((rises <= CONTACT_SLACK / 4 * epsilon * reach).all())
 
 
 def _slot_of_primitive(counts: np.ndarray, meshes: dict[int, PlacedMesh], slots: np.ndarray) -> np.ndarray:

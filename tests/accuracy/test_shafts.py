@@ -557,6 +557,16 @@ def test_other_meshes_do_not_pass_for_convex(change: str) -> None:
     assert not compiled({"shapes": [table]}).enclosures[0].convex
 
 
+def test_a_far_triangle_does_not_make_a_crease_convex() -> None:
+    """A floor and a wall at the origin, and a triangle a million units away: rounding there is none here."""
+    far = 1e6
+    vertices = [[0, 0, 0], [0.5, 0, 0], [0, 0, -0.5], [0, 0.5, 0]]
+    vertices += [[-far, -far, 0], [-far, -far, -far], [1e5 - far, -far - 1e5, 0]]
+    for faces in ([[0, 1, 2], [0, 2, 3], [4, 5, 6]], [[0, 2, 1], [0, 3, 2], [4, 6, 5]]):
+        mesh = {"kind": "mesh", "vertices": vertices, "faces": faces}
+        assert not compiled({"shapes": [mesh]}).enclosures[0].convex
+
+
 @dataclass
 class Lone:
     """A point, a triangle and a light in each of n lanes."""
