@@ -33,6 +33,9 @@ PLANE, SPHERE, MESH = range(3)
 KIND_UNIT = 256
 """The kind of a shape stands above the texture flags in one word."""
 
+DOCUMENT_STACK = 20
+"""Pending rays of a pixel at the document's cut-off, 0.05."""
+
 UNROLLED_SPHERES = 32
 """Up to so many spheres stand in the kernel one by one; more are looped over."""
 
@@ -153,9 +156,10 @@ def compile_scene(scene: Scene, backend: Backend) -> DeviceScene:
 
 
 def stack_entries(cutoff: float, max_depth: int) -> int:
-    """Pending rays of one pixel at most: they weigh <= 1 together and >= cutoff each, and one waits a
-    level."""
-    return max(1, min(int(1 / (cutoff - 1e-6)), max_depth))
+    """Room for the pending rays of one pixel: they weigh <= 1 together and >= cutoff each, and one waits a
+    level. Few sizes, since each is a kernel of its own: that of the document's cut-off, or a power of two."""
+    needed = min(int(1 / (cutoff - 1e-6)), max_depth)
+    return DOCUMENT_STACK if needed <= DOCUMENT_STACK else 1 << (needed - 1).bit_length()
 
 
 def _kind(shape: ShapeRecord) -> int:

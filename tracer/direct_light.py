@@ -31,6 +31,9 @@ from tracer.ray import Ray, Segment, max_abs
 from tracer.shafts import Ball, Suspects
 from tracer.shapes.plane import PlaneSlot
 
+VANISHING = -1000
+"""Highlights of 2^-1000 and less are none."""
+
 
 @dataclass
 class Finish:
@@ -67,7 +70,10 @@ def _power(base: Any, exponent: Any, active: Any) -> Any:
     """base^exponent with 0^0 = 1; a branch, since most packets of lanes have no highlight to raise."""
     result = dr.zeros(type(base), dr.width(active))
     if active:
-        result = dr.select(exponent == 0, 1, dr.power(base, exponent))
+        binary = exponent * dr.log2(base)
+        # Dr.Jit's exponential gives -inf, not 0, where the result leaves the range of double precision.
+        power = dr.select(binary > VANISHING, dr.exp2(binary), 0)
+        result = dr.select(exponent == 0, 1, power)
     return result
 
 

@@ -137,7 +137,10 @@ def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid) ->
 
         # ---- Go on with one of them, or one that waits, or the next sub-ray ----
         path = dr.select(refracts, children.refracted, children.reflected)
-        if dr.hint(reflects & refracts, exclude=[scene, canvas, pixels, backend, record]):
+        # Never False, but the size must stand in the kernel: Dr.Jit tells kernels apart by what they do, not
+        # by the size of local memory, and would take one with a smaller stack from its cache.
+        fits = top < scene.stack_size
+        if dr.hint(reflects & refracts & fits, exclude=[scene, canvas, pixels, backend, record]):
             stack.write(children.reflected, top)
             top += 1
         pops = active & ~reflects & ~refracts & (top > 0)

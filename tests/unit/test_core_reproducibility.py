@@ -80,13 +80,15 @@ def changed(path: str) -> tuple[dict[str, Any], dict[str, Any]]:
         table["materials"] = table["materials"] | {"glass": worlds.GLASS | {"ior": 1.7, "refraction": 0.6}}
     elif path == "mesh":
         table["shapes"][5]["translate"] = [3.5, 1.4, -2.5]
+    elif path == "cutoff":
+        table["cutoff"] = 0.3
     elif path == "supersample":
         settings["supersample"] = 3
     return table, settings
 
 
 @pytest.mark.parametrize(
-    "path", ["color", "position", "camera angle", "light weight", "material", "mesh", "supersample"]
+    "path", ["color", "position", "camera angle", "light weight", "material", "mesh", "cutoff", "supersample"]
 )
 def test_a_change_of_numbers_compiles_nothing(path: str) -> None:
     known = {entry["hash"] for entry in kernels_of(worlds.room())}
@@ -100,6 +102,15 @@ def test_a_change_of_numbers_compiles_nothing(path: str) -> None:
 def test_a_change_of_structure_is_seen_by_the_check_above() -> None:
     known = {entry["hash"] for entry in kernels_of(worlds.room())}
     assert {entry["hash"] for entry in kernels_of(worlds.room(transparent_shadows=True))} - known
+
+
+def test_a_larger_stack_is_a_kernel_of_its_own() -> None:
+    """Dr.Jit does not see the size of local memory: the kernel of a smaller stack would write beyond its
+    own."""
+    known = {entry["hash"] for entry in kernels_of(worlds.room(cutoff=0.05))}
+    deeper = kernels_of(worlds.room(cutoff=0.004))
+    assert {entry["hash"] for entry in deeper if entry["operation_count"] >= UPLOAD} - known
+    assert picture(worlds.room(cutoff=0.004)).stats["deepest_level"] <= 64
 
 
 @pytest.mark.parametrize(("rays_per_band", "bands"), [(1 << 21, 1), (300, 3)])

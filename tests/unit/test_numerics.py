@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tracer
-from tracer import ray
+from tracer import direct_light, ray
 from tracer.backends import Backend, exact_arithmetic, find_backend
 from tracer.ray import mirror_direction, normalize
 from tracer.textures.cells import CellRule
@@ -95,3 +95,20 @@ def test_a_plane_on_the_border_of_cells_has_one_color(
     assert colors_on_a_border(precision) == {0.0}
     monkeypatch.setattr(CellRule, "cell", lambda rule, q, largest: dr.floor(q))
     assert colors_on_a_border(precision) == {0.0, 1.0}
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+@pytest.mark.parametrize("exponent", [0.0, 1.0, 250.0, 1e4])
+def test_highlights_vanish_where_they_leave_the_range(exponent: float, precision: str) -> None:
+    """Where x^s is about 2^-1024 an exponential of Dr.Jit in double precision is -inf."""
+    backend = find_backend("llvm", precision)
+    small = 2 ** np.linspace(-5, 0, 100_001)
+    base = np.concatenate([[0.0, 1e-30, 1.0], np.linspace(0.0, 1.0, 100_001), small]).astype(backend.dtype)
+    with exact_arithmetic():
+        found = direct_light._power(backend.Float(base), backend.Float(exponent), backend.Bool(base >= 0))
+        found = found.numpy()
+    exact = base.astype(np.float64) ** exponent
+    assert np.isfinite(found).all()
+    # The exponent s log2(x) is rounded twice, and counts with its size; below 1e-37 a highlight is none.
+    size = 1 + exponent * np.abs(np.log2(np.maximum(base.astype(np.float64), 1e-300)))
+    assert (np.abs(found - exact) <= 8 * backend.epsilon * exact * size + 1e-37).all()
