@@ -90,9 +90,10 @@ TOLERANCES: dict[str, Tolerance] = {
         "4, 5",
     ),
     "grazing rays": Tolerance(
-        0.001,
+        0.0005,
         "share",
-        "rays that differ in the grazing band; 2 % of the free rays are aimed within 1e-4 r of silhouettes",
+        "rays that differ in the grazing band; 2 % of the free rays are aimed within 1e-4 r of silhouettes; "
+        "measured up to 1.2e-4 in half a million rays, 2.8e-4 in 18,000",
         "measured",
     ),
     "mitsuba sphere": Tolerance(

@@ -1,0 +1,141 @@
+"""What is compared, and what came out: terms, outcomes, and the ray that replays the worst difference."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+import tracer
+
+if TYPE_CHECKING:
+    from reference.comparison.case import Case
+
+Guilty = Literal["", "ours", "mitsuba", "both", "unknown"]
+
+
+@dataclass(frozen=True)
+class Replay:
+    """One ray and what both tracers say of it. `origin`, `direction`: as both were given them; `ours`,
+    `mitsuba`, `truth`: answers in words; `command`: what shows it again."""
+
+    origin: list[float]
+    direction: list[float]
+    ours: str
+    mitsuba: str
+    truth: str
+    command: str
+
+    def __str__(self) -> str:
+        return (
+            f"ray {self.origin} -> {self.direction}: ours {self.ours}; Mitsuba {self.mitsuba}; "
+            f"extended precision {self.truth}; replay: {self.command}"
+        )
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Free-running chains at one vertex: how many are left, median and 99 % of the distance between the two
+    tracers' vertices in S, and the median in units of eps S times the gain of the bounces so far."""
+
+    vertex: int
+    chains: int
+    median: float
+    most: float
+    scaled: float
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One term on one scene in one precision.
+
+    `rays` compared; `excluded`: rays that differ in the grazing band, at most `excluded_allowed`; `measured`,
+    `allowed`: the largest difference between the two tracers in `unit` (for ids and masks: how many differ
+    outside the band); `ours_error`, `mitsuba_error`: against extended precision, each in units of its own
+    precision, with their bounds, NaN where there is no closed form; `guilty`: who broke a bound; `samples`:
+    differences of some rays, with `distance_to_silhouette` in eps S of single precision; `worst`: the ray to
+    look at; `growth`: for chains.
+    """
+
+    term: str
+    scene: str
+    precision: str
+    backend: str
+    rays: int
+    measured: float
+    allowed: float
+    unit: str
+    excluded: int = 0
+    excluded_allowed: int = 0
+    ours_error: float = float("nan")
+    ours_allowed: float = float("nan")
+    mitsuba_error: float = float("nan")
+    mitsuba_allowed: float = float("nan")
+    guilty: Guilty = ""
+    worst: Replay | None = None
+    samples: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    distance_to_silhouette: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    growth: tuple[Growth, ...] = ()
+
+    @property
+    def margin(self) -> float:
+        """How many times the measured difference fits into what is allowed; infinite when there is none."""
+        return self.allowed / self.measured if self.measured else float("inf")
+
+    @property
+    def passed(self) -> bool:
+        """Whether every bound holds."""
+        return (
+            self.measured <= self.allowed
+            and self.excluded <= self.excluded_allowed
+            and not self.ours_error > self.ours_allowed
+            and not self.mitsuba_error > self.mitsuba_allowed
+        )
+
+    @property
+    def verdict(self) -> str:
+        """`passed` or `failed`."""
+        return "passed" if self.passed else "failed"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers, strings and lists for JSON; what is not finite becomes None."""
+        table = asdict(self) | {
+            "margin": self.margin,
+            "verdict": self.verdict,
+            "samples": self.samples.tolist(),
+            "distance_to_silhouette": self.distance_to_silhouette.tolist(),
+            "growth": [asdict(step) for step in self.growth],
+        }
+        return {key: _plain(value) for key, value in table.items()}
+
+    def __str__(self) -> str:
+        text = (
+            f"{self.term}, {self.scene}, {self.precision}: {self.verdict}; measured {self.measured:.3g}, "
+            f"allowed {self.allowed:.3g} {self.unit}; {self.rays} rays, {self.excluded} differ in the "
+            f"grazing band (allowed {self.excluded_allowed}); errors: ours {self.ours_error:.3g} (allowed "
+            f"{self.ours_allowed:.3g}), Mitsuba {self.mitsuba_error:.3g} (allowed {self.mitsuba_allowed:.3g})"
+        )
+        guilty = f"; guilty: {self.guilty}" if self.guilty else ""
+        return f"{text}{guilty}" + (f"; {self.worst}" if self.worst else "")
+
+
+@dataclass(frozen=True)
+class Term:
+    """One comparison. `compares`: in words; `applies`: whether a scene has what it needs; `run`: does it."""
+
+    name: str
+    compares: str
+    applies: Callable[[tracer.Scene], bool]
+    run: Callable[[Case], Outcome]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not np.isfinite(value) else value

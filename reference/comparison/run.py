@@ -1,0 +1,55 @@
+"""Runs terms on scenes: the one entry for the command, the report and the tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import tracer
+from reference.comparison import cameras, chains, events, hits, visibility
+from reference.comparison.case import Case
+from reference.comparison.records import Outcome, Term
+from tracer.errors import UsageError
+
+Progress = Callable[[int, int, Outcome], None]
+"""(terms done, terms in all, the latest outcome), called after every term."""
+
+
+def terms() -> list[Term]:
+    """All terms, in the order of a report."""
+    return [term for module in (cameras, hits, visibility, events, chains) for term in module.terms()]
+
+
+def find_terms(names: Sequence[str]) -> list[Term]:
+    """The terms of these names; raises `UsageError` for one that does not exist."""
+    known = {term.name: term for term in terms()}
+    wrong = [name for name in names if name not in known]
+    if wrong:
+        raise UsageError(f"term: {wrong[0]!r} is unknown; allowed are {', '.join(known)}")
+    return [known[name] for name in names]
+
+
+def run(
+    scenes: Sequence[tracer.Scene],
+    terms: Sequence[Term],
+    precisions: Sequence[str] = ("single", "double"),
+    rays: int = 20_000,
+    progress: Progress | None = None,
+    backend: str = "llvm",
+    seed: int = 0,
+) -> list[Outcome]:
+    """The outcomes of the terms that apply, scene by scene and precision by precision.
+
+    Raises `MachineError` without Mitsuba, `SceneError` for a scene that cannot be compiled.
+    """
+    work = [(scene, [term for term in terms if term.applies(scene)]) for scene in scenes]
+    total = len(precisions) * sum(len(applicable) for _, applicable in work)
+    outcomes: list[Outcome] = []
+    for scene, applicable in work:
+        case = Case(scene, backend=backend, rays=rays, seed=seed)
+        for precision in precisions:
+            case = case.in_precision(precision)
+            for term in applicable:
+                outcomes.append(term.run(case))
+                if progress is not None:
+                    progress(len(outcomes), total, outcomes[-1])
+    return outcomes

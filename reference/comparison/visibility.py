@@ -1,0 +1,129 @@
+"""The term of visibility: which lights are seen from the points that are hit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import tracer
+from reference import extended
+from reference.comparison import grazing
+from reference.comparison.case import Case, sizes
+from reference.comparison.judge import (
+    JUDGED,
+    LOOKED_AT,
+    SINGLE,
+    grazing_allowed,
+    guilty_side,
+    replay,
+    samples,
+)
+from reference.comparison.rays import RaySet, single
+from reference.comparison.records import Outcome, Term
+from reference.comparison.truth import Truth
+from reference.mitsuba_scene import SHADOW_START
+from reference.tolerances import TOLERANCES
+
+Array = np.ndarray
+
+FARTHEST = 4.0
+"""Points are at most so many extents S from the origin along an axis."""
+
+OUR_GUARD = 1e-4
+"""Our guard in double precision, as a share of Mitsuba's."""
+
+
+def has_lights(scene: tracer.Scene) -> bool:
+    """Whether there is something to see and something to see it by."""
+    return bool(scene.shapes and scene.lights)
+
+
+def ways(case: Case) -> tuple[RaySet, Array]:
+    """Our hit points, one sample of a light (n, 3) for each, and the ways between them as rays of unit
+    direction. Points far away are left out: both sides scale their guards by the farthest one."""
+    rays, ours, truth = case.bench.rays, case.ours, case.bench.truth
+    rng = np.random.default_rng([case.seed, 2])
+    near = np.abs(np.nan_to_num(ours.position)).max(axis=1) <= FARTHEST * case.bench.mitsuba.extent
+    k = np.flatnonzero(ours.valid & near)
+    p = ours.position[k].astype(np.float64)
+    light = single(truth.lights)[rng.integers(len(truth.lights), size=len(k))]
+    length = np.linalg.norm(light - p, axis=1)
+    apart = length > 10 * SHADOW_START * FARTHEST * case.bench.mitsuba.extent
+    d = (light - p)[apart] / length[apart, None]
+    return RaySet(p[apart], d, rays.pixel[k][apart]), light[apart]
+
+
+def compare_visibility(case: Case) -> Outcome:
+    """Whether a light is seen. Both sides leave out what is next to the ends, Mitsuba's guard being the
+    wider: blockers there, and ways that run within the band of a silhouette, an edge or, past the guard, of a
+    surface, may be counted otherwise."""
+    truth = case.bench.truth
+    rays, light = ways(case)
+    ours = tracer.visible(case.bench.scene, rays.o, light, precision=case.precision, backend=case.backend)
+    theirs = case.bench.mitsuba.visible(rays.o, light)
+    differ = np.flatnonzero(ours != theirs)
+    guard = SHADOW_START * max(
+        case.bench.mitsuba.extent, *(np.abs(x).max(initial=0) for x in (rays.o, light))
+    )
+    near = differ[:LOOKED_AT]
+    extent = sizes(truth, rays.o[near], light[near])
+    distance = border_distance(truth, rays.o[near], light[near], guard)
+    inside = distance <= TOLERANCES["grazing band"].value * SINGLE * extent
+    outside = np.concatenate([near[~inside], differ[LOOKED_AT:]])
+    seen = exact_visibility(truth, rays.o[outside[:JUDGED]], light[outside[:JUDGED]], guard)
+    wrong = [bool((side[outside[:JUDGED]] != seen).any()) for side in (ours, theirs)]
+    worst = None
+    if len(differ):
+        k = int(outside[0] if len(outside) else differ[0])
+        answers = ["sees" if side[k] else "does not see" for side in (ours, theirs)]
+        truly = ("sees" if seen[0] else "does not see") if len(seen) else "not asked"
+        at = f" the light at {light[k].tolist()}"
+        worst = replay(case, rays, k, (answers[0] + at, answers[1] + at, truly + at))
+    kept, silhouette = samples(case, rays, np.arange(len(ours)), None)
+    return Outcome(
+        term="visibility",
+        scene=case.scene.name,
+        precision=case.precision,
+        backend=case.backend,
+        rays=len(ours),
+        measured=float(len(outside)),
+        allowed=0.0,
+        unit="rays",
+        excluded=int(inside.sum()),
+        excluded_allowed=grazing_allowed(len(ours)),
+        guilty=guilty_side(2.0 * wrong[0], 2.0 * wrong[1]) if len(outside) else "",
+        worst=worst,
+        samples=(ours != theirs)[kept].astype(np.float64),
+        distance_to_silhouette=silhouette,
+    )
+
+
+def border_distance(truth: Truth, p: Array, light: Array, guard: float) -> Array:
+    """(n,) how far ways are from the border of a shadow: from silhouettes and edges between the ends, and at
+    both ends, a guard inside, from any surface; 0 where a surface is crossed nowhere but in the guards."""
+    if not len(p):
+        return np.zeros(0)
+    length = np.linalg.norm(light - p, axis=1)
+    d = (light - p) / length[:, None]
+    distance = grazing.silhouette_distance(truth, p, d, length)
+    for end in (p + guard * d, light - guard * d):
+        distance = np.minimum(distance, grazing.start_distance(truth, end))
+    only_in_guards = exact_visibility(truth, p, light, guard) & ~exact_visibility(
+        truth, p, light, guard * OUR_GUARD
+    )
+    return np.where(only_in_guards, 0, distance)
+
+
+def exact_visibility(truth: Truth, p: Array, light: Array, guard: float) -> Array:
+    """(n,) whether nothing lies between two points, a guard left out at either end."""
+    if not len(p):
+        return np.zeros(0, bool)
+    length = np.linalg.norm(light - p, axis=1)
+    d = (light - p) / length[:, None]
+    crossings = truth.crossings(extended.number(p) + extended.number(guard) * d, extended.unit(d))
+    t = np.stack([t for t, _, _ in crossings], axis=1)
+    return np.asarray(~((t > 0) & (t < (length - 2 * guard)[:, None])).any(axis=1))
+
+
+def terms() -> list[Term]:
+    """The one term."""
+    return [Term("visibility", "which lights are seen from the points hit", has_lights, compare_visibility)]

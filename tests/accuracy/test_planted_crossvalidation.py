@@ -1,0 +1,211 @@
+"""Errors planted on purpose: the comparison with Mitsuba and extended precision catches each, and says whose
+it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import drjit as dr
+import numpy as np
+import pytest
+
+import tracer
+from reference.comparison import Outcome, find_terms, run
+from reference.random_scenes import random_scene
+from tracer import canvas as canvas_module
+from tracer import device_scene, intersection, queries
+from tracer.canvas import DeviceCanvas
+from tracer.ray import Hit, Ray
+from tracer.shapes import Plane, Sphere, sphere
+from tracer.shapes.sphere import SphereSlot
+
+pytest.importorskip("mitsuba")
+
+Plant = Callable[[pytest.MonkeyPatch], None]
+
+RAYS = 3_000
+
+
+def normal_flipped(patch: pytest.MonkeyPatch) -> None:
+    true = SphereSlot.surface
+    patch.setitem(
+        intersection.ANALYTIC_SURFACES,
+        device_scene.SPHERE,
+        lambda row, p: (true(row, p)[0], -true(row, p)[1]),
+    )
+
+
+def eta_inverted(patch: pytest.MonkeyPatch) -> None:
+    true = queries.refract_direction
+    patch.setattr(queries, "refract_direction", lambda d, n, ior, entering: true(d, n, dr.rcp(ior), entering))
+
+
+def total_reflection_ignored(patch: pytest.MonkeyPatch) -> None:
+    """The ray goes straight on where it should not get out."""
+    true = queries.refract_direction
+
+    def always_out(d: Any, n: Any, ior: Any, entering: Any) -> tuple[Any, Any]:
+        bent, total = true(d, n, ior, entering)
+        return dr.select(total, d, bent), total & False
+
+    patch.setattr(queries, "refract_direction", always_out)
+
+
+def ray_offset(patch: pytest.MonkeyPatch) -> None:
+    """Secondary rays start 1e-3 S off their surface."""
+    true, extent = queries.leave, 0.01
+
+    def pushed(ray: Ray, surface: Any, d: Any, crosses: bool) -> Ray:
+        away = true(ray, surface, d, crosses)
+        return replace(away, o=away.o + (-1e-3 if crosses else 1e-3) * extent * surface.lit_side)
+
+    patch.setattr(queries, "leave", pushed)
+
+
+def depth_from_the_eye(patch: pytest.MonkeyPatch) -> None:
+    true = DeviceCanvas.ray
+
+    def from_eye(canvas: DeviceCanvas, o: Any, d: Any) -> tuple[Any, Any]:
+        return o * 0 + (canvas.center - canvas.forward), d
+
+    patch.setattr(
+        DeviceCanvas,
+        "ray",
+        lambda canvas, x, y: from_eye(canvas, *true(canvas, x, y)),
+    )
+
+
+def image_mirrored(patch: pytest.MonkeyPatch) -> None:
+    true = DeviceCanvas.ray
+    patch.setattr(DeviceCanvas, "ray", lambda canvas, x, y: true(canvas, 2 * canvas.half_width - x, y))
+
+
+def rotation_reversed(patch: pytest.MonkeyPatch) -> None:
+    true = canvas_module.cosine_sine
+    patch.setattr(canvas_module, "cosine_sine", lambda degrees: true(-degrees))
+
+
+def triangle_dropped(patch: pytest.MonkeyPatch) -> None:
+    true = device_scene.placed_meshes
+
+    def without_one(scene: tracer.Scene) -> dict[int, Any]:
+        meshes = true(scene)
+        number = min(meshes)
+        corners = meshes[number].corners.copy()
+        corners[0] = corners[0, 0]
+        return meshes | {number: replace(meshes[number], corners=corners)}
+
+    patch.setattr(device_scene, "placed_meshes", without_one)
+
+
+def single_for_double(patch: pytest.MonkeyPatch) -> None:
+    true = queries.find_backend
+    patch.setattr(queries, "find_backend", lambda name, precision: true(name, "single"))
+
+
+def radius_off(patch: pytest.MonkeyPatch) -> None:
+    true = Sphere.slot
+    patch.setattr(
+        Sphere, "slot", staticmethod(lambda types, row, *rest: true(types, row * [1, 1, 1, 1 + 1e-6], *rest))
+    )
+
+
+def plane_off(patch: pytest.MonkeyPatch) -> None:
+    true = Plane.slot
+    patch.setattr(
+        Plane, "slot", staticmethod(lambda types, row, *rest: true(types, row * [1, 1, 1, 1 + 1e-6], *rest))
+    )
+
+
+def shadow_rays_too_long(patch: pytest.MonkeyPatch) -> None:
+    """What lies behind a light hides it."""
+    true = queries.closest_hit
+    patch.setattr(queries, "closest_hit", lambda scene, ray, active, reach=None: true(scene, ray, active))
+
+
+def mirror_about_another_normal(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(intersection, "mirror_direction", lambda d, n: dr.fma(-1.999999 * dr.dot(n, d), n, d))
+
+
+def no_departure(patch: pytest.MonkeyPatch) -> None:
+    """The ray forgets what it leaves."""
+    patch.setattr(Ray, "leaves", lambda ray, primitive: dr.full(dr.mask_t(ray.o.x), False, dr.width(ray.o)))
+    patch.setattr(Ray, "departing", property(lambda ray: dr.full(dr.mask_t(ray.d.x), False, dr.width(ray.d))))
+
+
+def farther_hit_kept(patch: pytest.MonkeyPatch) -> None:
+    """A sphere hides what stands before it in the list of shapes, however far the sphere is."""
+
+    def keep_later(hit: Hit, t: Any, valid: Any, primitive: Any) -> Hit:
+        return Hit(dr.select(valid, t, hit.t), dr.select(valid, primitive, hit.primitive))
+
+    patch.setattr(sphere, "keep_nearer", keep_later)
+
+
+CATCHES: list[tuple[Plant, str, str, str]] = [
+    (normal_flipped, "normal, sphere", "double", "ours"),
+    (normal_flipped, "normal, sphere", "single", "ours"),
+    (eta_inverted, "refraction", "double", "ours"),
+    (total_reflection_ignored, "total reflection", "double", "ours"),
+    (ray_offset, "lockstep, next vertex", "double", "ours"),
+    (ray_offset, "chain growth", "double", "unknown"),
+    (depth_from_the_eye, "depth buffer", "single", "ours"),
+    (depth_from_the_eye, "camera rays", "single", "ours"),
+    (image_mirrored, "camera rays", "single", "ours"),
+    (image_mirrored, "depth buffer, mask", "single", "ours"),
+    # The adapter of the camera starts from our pose, so Mitsuba is turned the wrong way too.
+    (rotation_reversed, "camera rays", "double", "both"),
+    (triangle_dropped, "hits", "double", "ours"),
+    (single_for_double, "distance, sphere", "double", "ours"),
+    (single_for_double, "mirror", "double", "ours"),
+    (radius_off, "distance, sphere", "double", "ours"),
+    (plane_off, "distance, plane", "double", "ours"),
+    (shadow_rays_too_long, "visibility", "double", "ours"),
+    (mirror_about_another_normal, "mirror", "double", "ours"),
+    (no_departure, "lockstep, next hit", "single", "ours"),
+    (farther_hit_kept, "hits", "single", "ours"),
+]
+
+
+def outcome(term: str, precision: str) -> Outcome:
+    """On a random scene of a plane, spheres and solids, glass and mirrors, some thousandths in size; the
+    camera in the room, which is turned."""
+    scene = tracer.load("room") if term == "camera rays" else random_scene(3)
+    (found,) = run([scene], find_terms([term]), (precision,), RAYS)
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("plant", "term", "precision", "guilty"),
+    CATCHES,
+    ids=[f"{plant.__name__}, {term}, {precision}" for plant, term, precision, _ in CATCHES],
+)
+def test_a_planted_error_is_caught(
+    plant: Plant, term: str, precision: str, guilty: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plant(monkeypatch)
+    found = outcome(term, precision)
+    assert not found.passed, f"{term} did not notice: {found}"
+    assert found.guilty == guilty, str(found)
+    assert found.worst is not None and found.worst.command
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("term", "precision"), sorted({(term, precision) for _, term, precision, _ in CATCHES})
+)
+def test_nothing_is_caught_without_one(term: str, precision: str) -> None:
+    found = outcome(term, precision)
+    assert found.passed, str(found)
+
+
+def test_the_smallest_errors_are_far_above_what_is_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A radius off by 1e-6 is millions of eps in double precision."""
+    radius_off(monkeypatch)
+    found = outcome("distance, sphere", "double")
+    assert found.ours_error > 1e6 * found.ours_allowed
+    assert found.mitsuba_error <= found.mitsuba_allowed
+    assert np.isfinite(found.measured)
