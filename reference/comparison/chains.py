@@ -74,6 +74,8 @@ def compare_growth(case: Case) -> Outcome:
             median=float(np.median(gap[there, vertex])),
             most=float(np.quantile(gap[there, vertex], 0.99)),
             scaled=float(np.median(ratio[there, vertex])),
+            ours=float("nan"),
+            mitsuba=float("nan"),
         )
         for vertex, there in enumerate(np.isfinite(ratio).T)
         if there.sum() >= ENOUGH
