@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes .venv with the package and all development tools, then sees to an LLVM that Dr.Jit can use.
+# Makes .venv with the package and all development tools, then sees to an LLVM that Dr.Jit can use and to a browser.
 # A second run finds everything done. PYTHON=/path/to/python3 picks the interpreter of a new environment.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -82,6 +82,8 @@ if [ "$(cat "$stamp" 2>/dev/null)" != "$PWD" ] || [ pyproject.toml -nt "$stamp" 
         create_environment
     fi
     install_packages
+    # Here, not after every setup: where no browser can be installed, one attempt and one sentence are enough.
+    bash scripts/install_browser.sh
     echo "$PWD" >"$stamp"
 fi
 

@@ -1,0 +1,70 @@
+"""The report to look at: one HTML file with everything in it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import jinja2
+
+from reference.comparison.records import Validation
+from reference.report import bounds, numbers
+from reference.report.header import COMMAND
+from reference.report.headline import Headline
+from reference.report.matrix import CLASSES, matrix
+from reference.report.pictures import bar, viridis_bar
+from reference.report.sections import Section, sections_of
+from reference.report.summary import term_rows
+from reference.tolerances import TOLERANCES
+from tracer.film.atomic import atomic_write
+
+TEMPLATES = Path(__file__).resolve().parent / "templates"
+
+
+def write_report(path: str | os.PathLike[str], validation: Validation) -> None:
+    """The page; it loads nothing, neither from the network nor from files beside it. Raises OutputError."""
+    text = page(validation)
+    with atomic_write(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def page(validation: Validation) -> str:
+    """The text of the page."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    for name in ("number", "count", "percent", "times", "unit"):
+        environment.filters[name] = getattr(numbers, name)
+    environment.filters["used"] = bounds.used
+    sections = sections_of(validation.outcomes)
+    terms, rows = matrix(validation.outcomes)
+    return environment.get_template("page.html.j2").render(
+        validation=validation,
+        facts={name: value for name, value in validation.header.items() if name != COMMAND},
+        command=validation.header.get(COMMAND, ""),
+        headline=Headline.of(validation),
+        summary=term_rows(validation.outcomes),
+        outcomes=bounds.failures_first(validation.outcomes),
+        terms=terms,
+        rows=rows,
+        shades=CLASSES,
+        sections=sections,
+        anchors={section.scene: section.anchor for section in sections},
+        opened=_opened(sections),
+        tolerances=TOLERANCES,
+        bar=bar(),
+        depth_bar=viridis_bar(),
+        css="".join((TEMPLATES / name).read_text(encoding="utf-8") for name in ("report.css", "scene.css")),
+        script=(TEMPLATES / "report.js").read_text(encoding="utf-8"),
+    )
+
+
+def _opened(sections: list[Section]) -> set[str]:
+    """Anchors of the scenes that are open from the start: those with failures, or else the first."""
+    failing = {section.anchor for section in sections if section.failed}
+    return failing or {section.anchor for section in sections[:1]}
