@@ -6,7 +6,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=scripts/system.sh
 source scripts/system.sh
 
-# The names that tests/system/browser.py looks for.
+# The names that tests/system/test_report_page.py looks for.
 found() { command -v chromium || command -v chromium-browser || command -v google-chrome; } >/dev/null
 
 install_browser() {

@@ -43,6 +43,11 @@ def bounds_of(outcome: Outcome) -> list[Bound]:
     return found + [Bound(*error) for error in errors if not isnan(error[1]) and not isnan(error[2])]
 
 
+def broken(outcome: Outcome) -> list[Bound]:
+    """The bounds that do not hold; none where the outcome passed."""
+    return [bound for bound in bounds_of(outcome) if bound.used > 1]
+
+
 def tightest(outcome: Outcome) -> Bound:
     """The bound that is broken worst, or nearest to it."""
     return max(bounds_of(outcome), key=lambda bound: bound.used)

@@ -11,11 +11,10 @@ from matplotlib.ticker import FuncFormatter
 
 from reference.comparison.records import Growth, Outcome
 from reference.report import svg
-from reference.report.scatter import power
+from reference.report.scatter import COLORS, power
 
 WIDTH, HEIGHT = 4.9, 2.6
 PANEL, LEFT, BOTTOM, TOP = 1.75, 0.55, 0.5, 0.3
-COLORS = {"single": svg.SINGLE, "double": svg.DOUBLE}
 
 
 def draw_growth(outcomes: Sequence[Outcome]) -> Figure | None:

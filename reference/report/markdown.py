@@ -84,6 +84,7 @@ def rewrite_headline(path: str | os.PathLike[str], validation: Validation) -> No
 
 def _cells(row: TermRow) -> list[str]:
     worst = row.worst
+    over = worst.excluded > worst.excluded_allowed
     return [
         row.term,
         "passed"
@@ -97,7 +98,7 @@ def _cells(row: TermRow) -> list[str]:
         unit(worst.unit),
         times(worst.margin),
         *(_error(bound) for bound in (row.single, row.double, row.mitsuba)),
-        number(row.grazing),
+        number(row.grazing) + (f" (here {worst.excluded} of {worst.excluded_allowed})" if over else ""),
     ]
 
 

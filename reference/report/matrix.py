@@ -27,7 +27,7 @@ class Cell:
 
 def matrix(outcomes: tuple[Outcome, ...]) -> tuple[list[str], dict[str, list[Cell | None]]]:
     """The terms, and a row a scene; None where a term does not apply."""
-    terms = list(dict.fromkeys(outcome.term for outcome in outcomes))
+    terms = _in_order(outcomes)
     groups: dict[str, dict[str, list[Outcome]]] = {}
     for outcome in outcomes:
         groups.setdefault(outcome.scene, {}).setdefault(outcome.term, []).append(outcome)
@@ -36,6 +36,19 @@ def matrix(outcomes: tuple[Outcome, ...]) -> tuple[list[str], dict[str, list[Cel
         for scene, found in groups.items()
     }
     return terms, rows
+
+
+def _in_order(outcomes: tuple[Outcome, ...]) -> list[str]:
+    """All terms; one that the first scenes lack stands where it stands in its own scene."""
+    terms: list[str] = []
+    before = ("", "")
+    for outcome in outcomes:
+        if outcome.term not in terms:
+            scene, term = before
+            place = terms.index(term) + 1 if scene == outcome.scene and term else 0
+            terms.insert(place, outcome.term)
+        before = (outcome.scene, outcome.term)
+    return terms
 
 
 def shade(share: float) -> int:
@@ -51,7 +64,7 @@ def _cell(worst: Outcome) -> Cell:
     if worst.passed:
         text = "0" if not share else "<1" if share < 0.01 else f"{100 * share:.0f}"
     else:
-        text = number(bound.measured) if isinf(share) else f"{share:.1f}×"
+        text = number(bound.measured) if isinf(share) else f"{share:.1f}"
     allowed = f"{number(bound.measured)} of {number(bound.allowed)} allowed"
     what = f"{bound.name} {allowed}" + ("" if bound.name == "grazing rays" else f" {unit(worst.unit)}")
     guilty = f", guilty: {worst.guilty}" if worst.guilty else ""

@@ -5,24 +5,27 @@ from __future__ import annotations
 import re
 from math import isinf, isnan
 
-SYMBOLS = {"eps": "ε", "eta": "η", "theta": "θ", "sqrt": "√", "ulp": "ulp"}
+SYMBOLS = {"eps": "ε", "eta": "η", "theta": "θ", "sqrt": "√"}
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 NOTHING = "–"
 
 
 def number(value: float) -> str:
-    """Three digits; counts in full, in groups of thousands; a dash for what does not exist."""
+    """Three digits, fewer where the rest are zeros; counts in full, in groups of thousands; a dash for what
+    does not exist."""
     if isnan(value):
         return NOTHING
     if isinf(value):
         return "∞" if value > 0 else "−∞"
     if value == int(value) and abs(value) < 1e9:
         return f"{int(value):,}".replace("-", "−")
+    digits = next(digits for digits in (0, 1, 2) if digits == 2 or float(f"{value:.{digits}e}") == value)
     if 1e-3 <= abs(value) < 1e4:
-        text = f"{value:,.0f}" if abs(value) >= 100 else f"{value:#.3g}"
+        text = f"{value:,.0f}" if abs(value) >= 100 else f"{value:#.{digits + 1}g}".removesuffix(".")
     else:
-        digits, _, exponent = f"{value:.2e}".partition("e")
-        text = f"{digits}·10{str(int(exponent)).translate(SUPERSCRIPTS)}"
+        factor, _, exponent = f"{value:.{digits}e}".partition("e")
+        power = f"10{str(int(exponent)).translate(SUPERSCRIPTS)}"
+        text = power if factor == "1" else f"{factor}·{power}"
     return text.replace("-", "−")
 
 
@@ -56,4 +59,4 @@ def unit(text: str) -> str:
     """A unit of the table of tolerances with Greek letters and signs instead of their names."""
     for name, symbol in SYMBOLS.items():
         text = re.sub(rf"(?<![a-z]){name}(?![a-z])", symbol, text)
-    return text.replace("√ ", "√").replace("^2", "²").replace(" x ", " × ")
+    return re.sub(r"(?<=\w) x (?=e?\d)", " × ", text.replace("√ ", "√").replace("^2", "²"))

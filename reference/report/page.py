@@ -41,6 +41,7 @@ def page(validation: Validation) -> str:
     for name in ("number", "count", "percent", "times", "unit"):
         environment.filters[name] = getattr(numbers, name)
     environment.filters["used"] = bounds.used
+    environment.filters["broken"] = bounds.broken
     sections = sections_of(validation.outcomes)
     terms, rows = matrix(validation.outcomes)
     return environment.get_template("page.html.j2").render(

@@ -21,6 +21,7 @@ ONE_SIDED = (0x80, 0x80, 0x80, 0xFF)
 STEPS = 15
 """Shades a sign: more would be noise to the eye, and to the codec."""
 THUMBNAIL = 96  # pixels across
+EXACT = 1e-9  # by so much, in relation, a decimal end of a bar may be off
 RINGS = 300
 """Rings on a picture, at most."""
 
@@ -74,7 +75,7 @@ def trio_of(panels: Panels) -> Trio:
         range=number(limit) if limit else "",
         unit=_unit(panels.kind, ours, limit),
         largest=number(float(np.abs(difference).max(initial=0))),
-        beyond=int((np.abs(difference) > limit).sum()),
+        beyond=int((np.abs(difference) > limit * (1 + EXACT)).sum()),
         differing=int(differs.sum()),
         one_sided=int(one_sided.sum()),
         rings=[(float(x) + 0.5, float(y) + 0.5) for x, y in zip(columns, rows, strict=True)][:RINGS],
@@ -132,15 +133,15 @@ def _viridis(brightness: Array) -> Array:
 
 
 def _limit(difference: Array, apart: Array) -> float:
-    """The end of the bar: the largest difference of a pixel that is not counted as different, rounded up to
-    1, 2 or 5; the others would leave all the rest in one shade."""
-    rest = np.abs(difference[~apart])
-    largest = float(rest.max(initial=0)) or float(np.abs(difference).max(initial=0))
+    """The end of the bar, 1, 2 or 5: beyond it are one in a hundred of the differences of pixels that are not
+    counted as different. With the very largest as the end all the rest would have one shade."""
+    rest = np.abs(difference[~apart & (difference != 0)])
+    largest = float(np.quantile(rest, 0.99)) if rest.size else float(np.abs(difference).max(initial=0))
     if not largest:
         return 0.0
     power = 10.0 ** floor(log10(largest))
     return next(
-        float(f"{step * power:.1g}") for step in (1, 2, 5, 10) if step * power >= largest * (1 - 1e-9)
+        float(f"{step * power:.1g}") for step in (1, 2, 5, 10) if step * power * (1 + EXACT) >= largest
     )
 
 

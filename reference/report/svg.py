@@ -18,6 +18,15 @@ _VARIABLES = {
     INK: "ink", QUIET: "quiet", LINE: "line", PAPER: "paper",
     SINGLE: "single", DOUBLE: "double", MITSUBA: "mitsuba", BAD: "bad",
 }  # fmt: skip
+_LEFT_OUT = (
+    (r"<!--.*?-->|<metadata>.*?</metadata>|<style.*?</style>", ""),
+    (r'<path d="[^"]*" style="fill: none"/>', ""),  # the empty grounds of figure and axes
+    (r"font: ([\d.]+)px [^;\"]+", r"font-size: \1px"),
+    (r" font-family: [^;\"]+;", ""),
+    (r' transform="rotate\(-0 [^)]*\)"', ""),
+    (r'(?<=[xy]=")(-?\d+\.\d\d)\d+', r"\1"),
+)
+"""What Matplotlib writes and the page has no use for; letters are those of the page."""
 _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.image_inline": True,
@@ -30,6 +39,8 @@ _STYLE: dict[Any, Any] = {
     "axes.spines.right": False,
     "axes.axisbelow": True,
     "axes.labelsize": 8,
+    "xtick.bottom": False,
+    "ytick.left": False,
     "xtick.color": QUIET,
     "ytick.color": QUIET,
     "xtick.labelsize": 7.5,
@@ -53,26 +64,29 @@ def axes_of(figure: Figure, left: float, bottom: float, width: float, height: fl
 
 
 def svg_of(figure: Figure, name: str, description: str) -> str:
-    """The element `svg`; `name` keeps its ids apart from those of other drawings on the page."""
+    """The element `svg`, without what says nothing; `name` keeps its ids apart from those of other drawings
+    on the page, `description` is its label, escaped."""
     stream = io.StringIO()
     figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None})
     text = stream.getvalue()
-    text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text[text.index("<svg") :], flags=re.DOTALL)
+    view = re.search(r'viewBox="[^"]+"', text)
+    text = text[text.index("<defs>") : text.rindex("</svg>")]
     used = set(re.findall(r"(?:url\(#|href=\"#)([^)\"]+)", text))
     text = re.sub(r' id="([^"]+)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in used else "", text)
     text = re.sub(r'(url\(#|href="#)', rf"\g<1>{name}-", text).replace("xlink:href", "href")
     for stand_in, variable in _VARIABLES.items():
         text = text.replace(stand_in, f"var(--{variable})")
-    text = re.sub(r"font: ([\d.]+)px [^;\"]+", r"font-size: \1px", text)
+    for pattern, kept in _LEFT_OUT:
+        text = re.sub(pattern, kept, text, flags=re.DOTALL)
+    if "<g " not in text:
+        text = re.sub(r"</?g>", "", text)
     text = re.sub(r'(?<= d=")[^"]+', lambda m: _short(m[0]), text)
     text = re.sub(r"\s*\n\s*", "\n", text)
-    view = re.search(r'viewBox="[^"]+"', text)
-    head = f'<svg role="img" aria-label="{description}" {view[0] if view else ""}>'
-    return head + text[text.index(">") + 1 :].rstrip()
+    return f'<svg role="img" aria-label="{description}" {view[0] if view else ""}>{text}</svg>'
 
 
 def _short(path: str) -> str:
     """A path with a digit after the point, and dots (lines to where they start) as what takes least room."""
     path = re.sub(r"-?\d+\.\d+", lambda m: f"{float(m[0]):.1f}".removesuffix(".0"), path)
     path = re.sub(r"\s+", " ", path).strip()
-    return re.sub(r"M (\S+ \S+) L \1(?= M|$)", r"M\1h0", path)
+    return re.sub(r"M (\S+) (\S+) L \1 \2 ?", r"M\1 \2h0", path)

@@ -1,0 +1,166 @@
+"""The page of the report in a browser: nothing is loaded or logged, and what moves does."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import cv2
+import pytest
+
+from reference.report import write_report
+from tests.outcomes import failing_run
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, BrowserContext, Page, Route
+
+pytestmark = pytest.mark.slow
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """The system's browser; Playwright's own is never downloaded."""
+    from playwright.sync_api import sync_playwright
+
+    program = next((found for found in map(shutil.which, BROWSERS) if found), None)
+    if program is None:
+        pytest.skip(f"none of {', '.join(BROWSERS)} is on the path; scripts/install_browser.sh installs one")
+    with sync_playwright() as playwright:
+        # Its sandbox cannot start as root, as which tests run in containers.
+        opened = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of a run with a failure."""
+    path = tmp_path_factory.mktemp("report") / "index.html"
+    write_report(path, failing_run())
+    return path
+
+
+@pytest.fixture
+def context(browser: Browser) -> Iterator[BrowserContext]:
+    """A window that says on closing whether the page asked for anything or complained."""
+    found = browser.new_context(viewport={"width": 1400, "height": 900}, color_scheme="light")
+    complaints: list[str] = []
+
+    def only_files(route: Route) -> None:
+        if route.request.url.startswith(("file:", "data:")):
+            route.continue_()
+        else:
+            complaints.append(f"asked for {route.request.url}")
+            route.abort()
+
+    found.route("**/*", only_files)
+    found.on("console", lambda message: complaints.append(f"{message.type}: {message.text}"))
+    found.on("weberror", lambda error: complaints.append(str(error.error)))
+    yield found
+    found.close()
+    assert not complaints
+
+
+@pytest.fixture
+def page(context: BrowserContext, file: Path) -> Page:
+    """The page, opened."""
+    opened = context.new_page()
+    opened.goto(file.as_uri())
+    return opened
+
+
+def test_a_picture_is_swapped_under_the_mouse_and_kept_by_a_press(page: Page) -> None:
+    ours, theirs = page.locator("details[open] .trio").first.locator(".swap").all()
+    sources = [button.locator("img").get_attribute("src") for button in (ours, theirs)]
+    assert sources[0] != sources[1]
+    image = ours.locator("img")
+    ours.hover()
+    assert image.get_attribute("src") == sources[1] and ours.inner_text() == "Mitsuba"
+    page.mouse.move(0, 0)
+    assert image.get_attribute("src") == sources[0] and ours.inner_text() == "ours"
+    ours.click()
+    page.mouse.move(0, 0)
+    assert image.get_attribute("src") == sources[1] and ours.get_attribute("aria-pressed") == "true"
+    assert theirs.locator("img").get_attribute("src") == sources[1]
+
+
+def test_a_picture_is_swapped_with_the_keyboard(page: Page) -> None:
+    ours, theirs = page.locator("details[open] .trio").first.locator(".swap").all()
+    image, source = ours.locator("img"), ours.locator("img").get_attribute("src")
+    theirs.focus()
+    page.keyboard.press("Shift+Tab")
+    assert image.get_attribute("src") != source
+    page.keyboard.press("Enter")
+    page.keyboard.press("Tab")
+    assert image.get_attribute("src") != source and ours.get_attribute("aria-pressed") == "true"
+    page.keyboard.press("Shift+Tab")
+    page.keyboard.press("Space")
+    page.keyboard.press("Tab")
+    assert image.get_attribute("src") == source and ours.get_attribute("aria-pressed") == "false"
+
+
+def test_the_look_follows_the_system_until_the_button_says_otherwise(page: Page) -> None:
+    def paper() -> str:
+        return str(page.evaluate("getComputedStyle(document.body).backgroundColor"))
+
+    light = paper()
+    page.emulate_media(color_scheme="dark")
+    dark = paper()
+    assert dark != light
+    assert page.locator("#theme").get_attribute("aria-pressed") == "true"
+    page.locator("#theme").click()
+    assert paper() == light
+    page.locator("#theme").click()
+    assert paper() == dark
+    ink = page.evaluate("getComputedStyle(document.querySelector('.plot svg text')).fill")
+    assert ink == page.evaluate("getComputedStyle(document.querySelector('.scene .brief')).color")
+
+
+def test_failures_are_listed_first_and_their_scene_is_open(page: Page) -> None:
+    page.locator("#all > summary").click()
+    first = page.locator("#rows tr").first
+    assert first.inner_text().split("\t")[:3] == ["failed", "hits", "other"]
+    assert page.locator("#terms tbody tr").first.inner_text().startswith("1 failed\thits")
+    assert page.locator("details.scene[open] .name").all_inner_texts() == ["other"]
+
+
+def test_rows_are_filtered_by_words(page: Page) -> None:
+    page.locator("#all > summary").click()
+    page.locator("#filter").fill("Distance double")
+    rows = page.locator("#rows tr:visible")
+    assert rows.count() == 1 and "double" in rows.inner_text()
+    assert page.locator("#shown").inner_text() == "1 of 10"
+    page.locator("#filter").fill("")
+    assert page.locator("#rows tr:visible").count() == 10
+    page.locator("details.scene[open] .filter-link").click()
+    assert page.locator("#rows tr:visible").count() == 3
+
+
+def test_a_square_of_the_matrix_opens_its_scene(page: Page) -> None:
+    closed = page.locator("#scene-1")
+    assert closed.get_attribute("open") is None
+    page.locator("#matrix tbody tr").first.locator("td a").first.click()
+    page.wait_for_function("document.getElementById('scene-1').open")
+    assert closed.locator(".plot svg").first.is_visible()
+
+
+@pytest.mark.parametrize("width, look", [(1400, "light"), (1400, "dark"), (400, "light")])
+def test_it_shows_something_at_every_width_and_never_runs_over(
+    page: Page, tmp_path: Path, width: int, look: str
+) -> None:
+    page.emulate_media(color_scheme=look)  # type: ignore[arg-type]
+    page.set_viewport_size({"width": width, "height": 900})
+    page.locator("#unfold").click()
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    for name in ("header", "#matrix", "#scene-1 .trio", "#scene-1 .plots"):
+        target = page.locator(name).first
+        target.scroll_into_view_if_needed()
+        target.screenshot(path=tmp_path / "shot.png")
+        shot = cv2.imread(str(tmp_path / "shot.png"), cv2.IMREAD_GRAYSCALE)
+        assert shot is not None and shot.std() > 5, name
+    loaded = "[...document.querySelectorAll('#scene-1 img')].map((image) => image.decode())"
+    assert page.evaluate(f"Promise.all({loaded}).then((all) => all.length)") == 7
