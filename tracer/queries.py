@@ -6,6 +6,7 @@ follows a chain of mirror reflections and refractions.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,12 +49,14 @@ class Paths:
     """Specular chains of n rays with k events.
 
     `position` (n, k, 3) of each vertex, `direction` (n, k, 3) in which the chain leaves it (NaN after total
-    reflection), `shape` (n, k), `count` (n,) vertices reached. NaN and -1 where unused.
+    reflection), `shape`, `primitive` (n, k) numbers as in `Hits`, `count` (n,) vertices reached. NaN and -1
+    where unused.
     """
 
     position: np.ndarray
     direction: np.ndarray
     shape: np.ndarray
+    primitive: np.ndarray
     count: np.ndarray
 
 
@@ -121,7 +124,7 @@ def trace_path(
     scene: Scene,
     origins: ArrayLike,
     directions: ArrayLike,
-    events: str,
+    events: str | Sequence[str],
     *,
     precision: str = "double",
     backend: str = "auto",
@@ -130,51 +133,74 @@ def trace_path(
 
     Materials only give the index of refraction; their shares and the cut-off play no part. Total reflection
     under a T ends the chain: its vertex counts, its direction is NaN.
+
+    Args:
+        origins, directions: (n, 3), or (3,) for one; directions need not be normalized.
+        events: one string for all rays, or n strings of one length k, one for each.
+
+    Raises: `UsageError` for wrong shapes, NaN and zero directions, other letters than R and T.
     """
     types = find_backend(backend, precision)
     o, d = _rays(origins, directions)
-    wrong = sorted(set(events) - {"R", "T"})
-    if wrong:
-        raise UsageError(f"events: {events!r} contains {wrong[0]!r}; allowed are the letters R and T")
-    n, k = len(o), len(events)
+    refracts = _events(events, len(o))
+    n, k = refracts.shape
     position, direction = np.full((n, k, 3), np.nan), np.full((n, k, 3), np.nan)
-    shape, count = np.full((n, k), -1, np.int64), np.zeros(n, np.int64)
+    shape, primitive, count = np.full((n, k), -1), np.full((n, k), -1), np.zeros(n, np.int64)
     if not n or not k:
-        return Paths(position, direction, shape, count)
+        return Paths(position, direction, shape, primitive, count)
     with exact_arithmetic():
         device = compile_scene(scene, types)
         ray = free_ray(device, _upload(types, o), _upload_directions(types, d))
         active = dr.full(types.Bool, True, n)
-        for step, event in enumerate(events):
+        for step in range(k):
             hit = closest_hit(device, ray, active)
             active = active & hit.valid
             surface = surface_at(device, ray, hit, active)
-            ray, ends = _event(device, ray, surface, event, active)
+            ray, ends = _event(device, ray, surface, types.Bool(refracts[:, step].copy()), active)
             leaves = active & ~ends
-            dr.eval(ray, surface, active, leaves)
+            dr.eval(hit, ray, surface, active, leaves)
             reached, left = active.numpy(), leaves.numpy()
             position[reached, step] = surface.p.numpy().T[reached]
             direction[left, step] = ray.d.numpy().T[left]
-            shape[reached, step] = surface.shape.numpy()[reached]
+            shape[reached, step], primitive[reached, step] = (
+                numbers[reached] for numbers in _numbers(device, hit, surface)
+            )
             count += reached
             active = leaves
-    return Paths(position, direction, shape, count)
+    return Paths(position, direction, shape, primitive, count)
 
 
-def _event(device: DeviceScene, ray: Ray, surface: Any, event: str, active: Any) -> tuple[Ray, Any]:
-    """The ray after a mirror reflection or a refraction, and the mask of total reflection."""
-    if event == "R":
-        return leave(ray, surface, surface.mirrored, crosses=False), ~active
+def _events(events: str | Sequence[str], n: int) -> np.ndarray:
+    """(n, k) bool: the event is a refraction. Data, not structure: all chains share one kernel."""
+    rows = [events] if isinstance(events, str) else list(events)
+    for row in rows:
+        wrong = sorted(set(row) - {"R", "T"})
+        if wrong:
+            raise UsageError(f"events: {row!r} contains {wrong[0]!r}; allowed are the letters R and T")
+    lengths = sorted({len(row) for row in rows})
+    if not isinstance(events, str) and (len(rows) != n or len(lengths) > 1):
+        raise UsageError(
+            f"events: {len(rows)} strings of {lengths} letters; allowed are one string, or {n} of one length"
+        )
+    table = np.array([[letter == "T" for letter in row] for row in rows], bool)
+    table = table.reshape(len(rows), lengths[0] if lengths else 0)
+    return np.repeat(table, n, axis=0) if isinstance(events, str) else table
+
+
+def _event(device: DeviceScene, ray: Ray, surface: Any, refracts: Any, active: Any) -> tuple[Ray, Any]:
+    """The rays after a refraction where `refracts`, else after a mirror reflection, and the mask of total
+    reflection."""
     ior = material_at(device, surface, active).ior
     bent, total = refract_direction(ray.d, surface.normal, ior, surface.entering)
-    return leave(ray, surface, bent, crosses=True), active & total
+    mirrored, through = (
+        leave(ray, surface, d, crosses) for d, crosses in ((surface.mirrored, False), (bent, True))
+    )
+    return dr.select(refracts, through, mirrored), active & refracts & total
 
 
 def _hits(device: DeviceScene, hit: Hit, surface: Any) -> Hits:
     valid = hit.primitive.numpy() != INVALID
-    shape = np.where(valid, surface.shape.numpy().astype(np.int64), -1)
-    first = device.host.first_primitive
-    primitive = np.where(valid, hit.primitive.numpy() - first[np.maximum(shape, 0)], -1)
+    shape, primitive = _numbers(device, hit, surface)
     face = primitive.copy()
     for number, mesh in device.host.meshes.items():
         here = shape == number
@@ -188,6 +214,15 @@ def _hits(device: DeviceScene, hit: Hit, surface: Any) -> Hits:
         position=np.where(valid[:, None], surface.p.numpy().T, np.nan),
         valid=valid,
     )
+
+
+def _numbers(device: DeviceScene, hit: Hit, surface: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of the shape and of the primitive within it (n,), -1 on a miss."""
+    primitive = hit.primitive.numpy().astype(np.int64)
+    valid = primitive != INVALID
+    shape = np.where(valid, surface.shape.numpy().astype(np.int64), -1)
+    first = device.host.first_primitive
+    return shape, np.where(valid, primitive - first[np.maximum(shape, 0)], -1)
 
 
 def _no_hits() -> Hits:

@@ -17,17 +17,23 @@ from tracer.shapes import Sphere
 
 Array = np.ndarray
 
+PIXELS = 40_000
+"""Pixels of a picture that is compared, at most."""
+
 HORIZON = 1e4
 """Planes that are hit farther away than this many extents S may be missed: Mitsuba's are disks, and end."""
 
 
 class Bench:
     """What does not depend on the precision of our side: the scene with spheres rounded to single precision
-    (all sides see the same numbers then, as meshes are rounded anyway), closed forms, Mitsuba, the rays."""
+    (all sides see the same numbers then, as meshes are rounded anyway), the same in a small picture, closed
+    forms, Mitsuba, the rays."""
 
     def __init__(self, scene: tracer.Scene, rays: int, seed: int) -> None:
         self.scene = comparable(scene)
+        self.small = small_picture(self.scene, min(rays, PIXELS))
         self.count, self.seed = rays, seed
+        self.memory: dict[str, Any] = {}
 
     @cached_property
     def truth(self) -> Truth:
@@ -49,10 +55,10 @@ class Bench:
         """Mitsuba's hits of these rays."""
         return self.mitsuba.intersect(self.rays.o, self.rays.d)
 
-    @cached_property
-    def their_truth(self) -> tuple[Array, Array]:
-        """Closed forms of t and normal for what Mitsuba hit."""
-        return truth_of_hits(self.truth, self.rays, self.theirs.shape, self.theirs.primitive)
+    @staticmethod
+    def ulps(error: Array, value: Array | None = None) -> Array:
+        """Errors of Mitsuba in ulp of single precision of `value`, of 1 when left out."""
+        return in_ulp(error, value, "single")
 
 
 @dataclass
@@ -75,6 +81,10 @@ class Case:
         other = replace(self, precision=precision)
         other.bench = self.bench
         return other
+
+    def ulps(self, error: Array, value: Array | None = None) -> Array:
+        """Errors of ours in ulp of our precision of `value`, of 1 when left out."""
+        return in_ulp(error, value, self.precision)
 
     @property
     def epsilon(self) -> float:
@@ -101,11 +111,19 @@ class Case:
         return sizes(self.bench.truth, self.bench.rays.o, self.ours.position)
 
 
+def in_ulp(error: Array, value: Array | None, precision: str) -> Array:
+    """(n,) |error| in units of the last place of values, of 1 when left out."""
+    dtype = np.float32 if precision == "single" else np.float64
+    place = np.spacing(np.abs(np.ones(()) if value is None else value).astype(dtype)).astype(np.float64)
+    return np.asarray(np.abs(error) / place)
+
+
 def comparable(scene: tracer.Scene) -> tracer.Scene:
-    """The scene with spheres placed and rounded to single precision."""
+    """The scene with spheres placed and rounded to single precision, but for those whose texture needs their
+    own frame."""
     shapes = []
     for shape in scene.shapes:
-        if isinstance(shape, Sphere):
+        if isinstance(shape, Sphere) and shape.texture_space != "object":
             *center, radius = single(shape.placed_coefficients()).tolist()
             placed = {"center": tuple(center), "radius": radius, "scale": 1.0, "rotate": (0.0,) * 3}
             shape = shape.model_copy(update=placed | {"translate": (0.0,) * 3})
@@ -114,16 +132,16 @@ def comparable(scene: tracer.Scene) -> tracer.Scene:
 
 
 def small_picture(scene: tracer.Scene, pixels: int) -> tracer.Scene:
-    """The scene with a picture of about so many pixels at most; the framing stays."""
+    """The scene with a picture of about so many pixels at most, without depth of field; the framing stays."""
     camera = scene.camera
     width, height = camera.resolution
-    if width * height <= pixels:
-        return scene
-    scale = (pixels / (width * height)) ** 0.5
-    resolution = (max(1, round(width * scale)), max(1, round(height * scale)))
-    update: dict[str, Any] = {"resolution": resolution}
-    if not camera.is_look_at:
-        update["pixel_size"] = camera.pixel_size * width / resolution[0]
+    update: dict[str, Any] = {"depth_of_field": None}
+    if width * height > pixels:
+        scale = (pixels / (width * height)) ** 0.5
+        resolution = (max(1, round(width * scale)), max(1, round(height * scale)))
+        update["resolution"] = resolution
+        if not camera.is_look_at:
+            update["pixel_size"] = camera.pixel_size * width / resolution[0]
     return scene.model_copy(update={"camera": camera.model_copy(update=update)})
 
 

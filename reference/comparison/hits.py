@@ -6,30 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-import tracer
 from reference.comparison.case import Case, roundness, truth_of_hits
-from reference.comparison.judge import (
-    SINGLE,
-    Answers,
-    Numbers,
-    bounds,
-    hit_distance,
-    judge_ids,
-    judge_numbers,
-)
+from reference.comparison.decisions import Answers, hit_distance, judge_ids
+from reference.comparison.judge import SINGLE, Numbers, bounds, judge_numbers
+from reference.comparison.kinds import by_kind, has_shapes
 from reference.comparison.records import Outcome, Term
-from reference.comparison.truth import MESH, PLANE, SPHERE
 from reference.tolerances import TOLERANCES
-from tracer.shapes import Instance, Mesh, Plane, Sphere
 
 Array = np.ndarray
-
-RECORDS = {PLANE: (Plane,), SPHERE: (Sphere,), MESH: (Mesh, Instance)}
-
-
-def has_shapes(scene: tracer.Scene) -> bool:
-    """Whether there is anything to hit."""
-    return bool(scene.shapes)
 
 
 def compare_ids(case: Case) -> Outcome:
@@ -98,6 +82,7 @@ def compare_distance(case: Case, kind: str) -> Outcome:
         mitsuba=np.abs(theirs_t - at.t) / (SINGLE * unit * at.condition),
         unit="eps S / cos",
         answers=lambda i: (f"t = {ours_t[i]!s}", f"t = {theirs_t[i]!s}", f"t = {at.t[i]!s}"),
+        ulp=(case.ulps(ours_t - at.t, at.t), case.bench.ulps(theirs_t - at.t, at.t)),
     )
     return judge_numbers(case, f"distance, {kind}", numbers, bounds(case, "distance", f"mitsuba {kind}"))
 
@@ -109,14 +94,19 @@ def compare_normal(case: Case, kind: str) -> Outcome:
     ours, theirs = case.ours.normal[at.k], case.bench.theirs.n[at.k]
     flat = ~np.isfinite(at.radius)
     unit = np.where(flat, 1, at.extent / (np.where(flat, 1, at.radius) * at.cosine))
+    difference, own, other = (
+        np.abs(a - b).max(axis=1, initial=0)
+        for a, b in ((ours, theirs), (ours, at.normal), (theirs, at.normal))
+    )
     numbers = Numbers(
         rays=case.bench.rays,
         index=at.k,
-        difference=np.abs(ours - theirs).max(axis=1, initial=0) / (SINGLE * unit * at.condition),
-        ours=np.abs(ours - at.normal).max(axis=1, initial=0) / (case.epsilon * unit),
-        mitsuba=np.abs(theirs - at.normal).max(axis=1, initial=0) / (SINGLE * unit * at.condition),
+        difference=difference / (SINGLE * unit * at.condition),
+        ours=own / (case.epsilon * unit),
+        mitsuba=other / (SINGLE * unit * at.condition),
         unit="eps S / (r cos)",
         answers=lambda i: (f"normal {ours[i]}", f"normal {theirs[i]}", f"normal {at.normal[i]}"),
+        ulp=(case.ulps(own), case.bench.ulps(other)),
     )
     return judge_numbers(case, f"normal, {kind}", numbers, bounds(case, "normal", "mitsuba normal"))
 
@@ -137,29 +127,16 @@ def compare_position(case: Case, kind: str) -> Outcome:
         answers=lambda i: tuple(  # type: ignore[arg-type, return-value]
             f"position {p}" for p in (case.ours.position[at.k[i]], theirs.p[at.k[i]], exact[i])
         ),
+        ulp=(case.ulps(ours, unit), case.bench.ulps(other, unit)),
     )
     return judge_numbers(case, f"position, {kind}", numbers, bounds(case, "position", f"mitsuba {kind}"))
 
 
-def _has(kind: str, scene: tracer.Scene) -> bool:
-    return any(isinstance(shape, RECORDS[kind]) for shape in scene.shapes)
-
-
 def terms() -> list[Term]:
     """One term of ids, and three of numbers for each kind of shape."""
-    found = [Term("hits", "hit mask, shape and primitive of primary and free rays", has_shapes, compare_ids)]
-    for kind in RECORDS:
-        for name, compare, what in (
-            ("distance", compare_distance, "distance along the ray, |dt cos|"),
-            ("normal", compare_normal, "outward geometric normal"),
-            ("position", compare_position, "position across the surface, |dp.n|"),
-        ):
-            found.append(
-                Term(
-                    f"{name}, {kind}",
-                    f"{what}, of hits of a {kind}",
-                    lambda scene, kind=kind: _has(kind, scene),  # type: ignore[misc]
-                    lambda case, kind=kind, compare=compare: compare(case, kind),  # type: ignore[misc]
-                )
-            )
-    return found
+    return [
+        Term("hits", "hit mask, shape and primitive of primary and free rays", has_shapes, compare_ids),
+        *by_kind("distance", "distance along the ray to a hit, |dt cos|", compare_distance),
+        *by_kind("normal", "outward geometric normal at a hit", compare_normal),
+        *by_kind("position", "position of a hit across the surface, |dp.n|", compare_position),
+    ]

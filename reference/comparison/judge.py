@@ -1,31 +1,29 @@
-"""From differences to a verdict: how large, how many, whose error, and which ray shows it."""
+"""From errors to a verdict: how large they are, whose they are, and which ray shows it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
 from reference.comparison import grazing
-from reference.comparison.case import HORIZON, Case, sizes
+from reference.comparison.case import Case, sizes
 from reference.comparison.rays import RaySet
-from reference.comparison.records import Guilty, Outcome, Replay
+from reference.comparison.records import Guilty, Outcome, Replay, Spectrum
 from reference.tolerances import EPSILON, TOLERANCES
 
 Array = np.ndarray
+
+Sides: TypeAlias = tuple[str, str, str]
+"""What ours, Mitsuba and extended precision say, in words."""
 
 SAMPLES = 500
 """Rays of an outcome whose difference and distance to a silhouette are kept for drawing, at most."""
 
 SAMPLED_PAIRS = 200_000
 """Pairs of such a ray and an edge: scenes with many triangles have fewer samples."""
-
-LOOKED_AT = 1000
-"""Differing rays whose distance to the grazing band is computed; more count as outside it."""
-
-JUDGED = 20
-"""Differing rays for which extended precision asks every primitive of the scene."""
 
 SINGLE = EPSILON["single"]
 
@@ -51,7 +49,8 @@ class Numbers:
     ours: Array
     mitsuba: Array
     unit: str
-    answers: Callable[[int], tuple[str, str, str]]
+    answers: Callable[[int], Sides]
+    ulp: tuple[Array, Array] | None = None
 
 
 def bounds(case: Case, ours: str, mitsuba: str) -> Bounds:
@@ -90,6 +89,7 @@ def judge_numbers(case: Case, term: str, numbers: Numbers, allowed: Bounds) -> O
         else replay(case, numbers.rays, numbers.index[worst], numbers.answers(worst)),
         samples=difference[kept],
         distance_to_silhouette=distance,
+        spectrum=None if numbers.ulp is None else Spectrum.of(*numbers.ulp),
     )
 
 
@@ -114,102 +114,16 @@ def samples(case: Case, rays: RaySet, index: Array, worst: int | None) -> tuple[
     return kept, distance / (SINGLE * sizes(case.bench.truth, o))
 
 
-def replay(case: Case, rays: RaySet, k: int, answers: tuple[str, str, str]) -> Replay:
+def replay(case: Case, rays: RaySet, k: int, answers: Sides, in_band: bool = False) -> Replay:
     """The ray as a record, with the command that shows it again."""
-    o, d, name = rays.o[k].tolist(), rays.d[k].tolist(), case.scene.name
-    scene = f"tracer.load({name!r})"
-    where = name
-    if name.startswith("random-"):
-        seed = name.removeprefix("random-")
-        scene, where = f"reference.random_scenes.random_scene({seed})", f"--random 1 --seed {seed}"
-    column, row = rays.pixel[k]
-    command = f"tracer.intersect({scene}, {o}, {d}, precision={case.precision!r})"
-    if column >= 0:
-        command = f"tracer validate {where} --pixel {column} {row}"
-    return Replay(o, d, *answers, command=command)
-
-
-@dataclass(frozen=True)
-class Answers:
-    """Shape and primitive (n,) that one side hits, -1 on a miss."""
-
-    shape: Array
-    primitive: Array
-
-    def at(self, k: int) -> str:
-        """In words."""
-        if self.shape[k] < 0:
-            return "misses"
-        return f"hits shape {self.shape[k]}, primitive {self.primitive[k]}"
-
-
-def judge_ids(
-    case: Case,
-    term: str,
-    rays: RaySet,
-    ours: Answers,
-    mitsuba: Answers,
-    distance: Callable[[Array], Array],
-) -> Outcome:
-    """The verdict on what rays hit: outside the grazing band both sides must name the same primitive.
-
-    `distance`: by how much some rays (by number) miss the nearest place where rounding decides.
-    """
-    differ = np.flatnonzero((ours.shape != mitsuba.shape) | (ours.primitive != mitsuba.primitive))
-    near = differ[:LOOKED_AT]
-    band = TOLERANCES["grazing band"].value * SINGLE * sizes(case.bench.truth, rays.o[near])
-    inside = distance(near) <= band
-    outside = np.concatenate([near[~inside], differ[LOOKED_AT:]])
-    guilty, truth = guilty_of_ids(case, rays, outside[:JUDGED], ours, mitsuba)
-    worst = None
-    if len(differ):
-        k = int(outside[0] if len(outside) else differ[0])
-        worst = replay(case, rays, k, (ours.at(k), mitsuba.at(k), truth or "not asked"))
-    kept, silhouette = samples(case, rays, np.arange(len(rays)), None)
-    return Outcome(
-        term=term,
-        scene=case.scene.name,
-        precision=case.precision,
-        backend=case.backend,
-        rays=len(rays),
-        measured=float(len(outside)),
-        allowed=0.0,
-        unit="rays",
-        excluded=int(inside.sum()),
-        excluded_allowed=grazing_allowed(len(rays)),
-        guilty=guilty,
-        worst=worst,
-        samples=np.isin(kept, differ).astype(np.float64),
-        distance_to_silhouette=silhouette,
+    name = case.scene.name
+    where = f"--random 1 --seed {name.removeprefix('random-')}" if name.startswith("random-") else name
+    column, row = (int(x) for x in rays.pixel[k])
+    return Replay(
+        rays.o[k].tolist(),
+        rays.d[k].tolist(),
+        *answers,
+        command=f"tracer validate {where} {rays.options(k)}",
+        pixel=(column, row) if column >= 0 else None,
+        in_band=in_band,
     )
-
-
-def grazing_allowed(rays: int) -> int:
-    """How many of so many rays may differ in the grazing band."""
-    return int(np.ceil(TOLERANCES["grazing rays"].value * rays))
-
-
-def hit_distance(case: Case, rays: RaySet, k: Array, ours: Answers, mitsuba: Answers, reach: Array) -> Array:
-    """(n,) lengths by which some rays (by number) are off a silhouette, an edge, a tie of the two primitives
-    that are named, or 0 at the horizon of a plane. `reach` (all rays): distance of the farther hit."""
-    truth, o, d = case.bench.truth, rays.o[k], rays.d[k]
-    distance = grazing.silhouette_distance(truth, o, d, reach[k])
-    both = (ours.shape[k] >= 0) & (mitsuba.shape[k] >= 0)
-    i = k[both]
-    a, b = (np.stack([side.shape[i], side.primitive[i]], axis=1) for side in (ours, mitsuba))
-    distance[both] = np.minimum(distance[both], grazing.tie_distance(truth, o[both], d[both], a, b))
-    farthest = np.where(np.isfinite(reach[k]), reach[k], 0)
-    horizon = farthest > HORIZON * case.bench.mitsuba.extent
-    return np.where(horizon, 0, distance)
-
-
-def guilty_of_ids(case: Case, rays: RaySet, k: Array, ours: Answers, mitsuba: Answers) -> tuple[Guilty, str]:
-    """Who names another primitive than extended precision does, and what that says of the first ray."""
-    if not len(k):
-        return "", ""
-    shape, primitive, _ = case.bench.truth.nearest(rays.o[k], rays.d[k])
-    wrong = [
-        bool(((side.shape[k] != shape) | (side.primitive[k] != primitive)).any()) for side in (ours, mitsuba)
-    ]
-    guilty: Guilty = "both" if all(wrong) else "ours" if wrong[0] else "mitsuba"
-    return guilty, Answers(shape, primitive).at(0)

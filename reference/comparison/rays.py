@@ -33,6 +33,27 @@ class RaySet:
         """Some of the rays, by number or mask."""
         return RaySet(self.o[k], self.d[k], self.pixel[k])
 
+    def options(self, k: int) -> str:
+        """The options of `tracer validate` that show a ray again."""
+        column, row = self.pixel[k]
+        if column >= 0:
+            return f"--pixel {column} {row}"
+        numbers = " ".join(repr(float(x)) for x in (*self.o[k], *self.d[k]))
+        return f"--ray {numbers}"
+
+
+@dataclass(frozen=True)
+class StepRays(RaySet):
+    """Rays that are steps of chains: `first`: the rays that the chains began with, `events` (n,): the letters
+    of each chain."""
+
+    first: RaySet
+    events: Array
+
+    def options(self, k: int) -> str:
+        """The options that show the whole chain again."""
+        return f"{self.first.options(k)} --events {self.events[k]}"
+
 
 def single(values: Array) -> Array:
     """The nearest single precision numbers, as doubles."""

@@ -144,7 +144,7 @@ class Outcome:
         return "passed" if self.passed else "failed"
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain numbers, strings and lists for JSON; what is not finite becomes None. Pictures are left out."""
+        """Plain numbers, strings and lists for JSON; what is not finite becomes None; no pictures."""
         table = asdict(replace(self, panels=None)) | {
             "margin": self.margin,
             "verdict": self.verdict,
@@ -165,12 +165,14 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Term:
-    """One comparison. `compares`: in words; `applies`: whether a scene has what it needs; `run`: does it."""
+    """One comparison. `compares`: in words; `applies`: whether a scene has what it needs; `run`: does it;
+    `precisions`: in which it makes sense."""
 
     name: str
     compares: str
     applies: Callable[[tracer.Scene], bool]
     run: Callable[[Case], Outcome]
+    precisions: tuple[str, ...] = ("single", "double")
 
 
 @dataclass(frozen=True)

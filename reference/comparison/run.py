@@ -5,7 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import tracer
-from reference.comparison import cameras, chains, events, hits, visibility
+from reference.comparison import (
+    cameras,
+    chains,
+    depths,
+    directions,
+    hits,
+    lockstep,
+    pictures,
+    second_version,
+    total_reflection,
+    visibility,
+)
 from reference.comparison.case import Case
 from reference.comparison.records import Outcome, Term
 from tracer.errors import UsageError
@@ -16,7 +27,9 @@ Progress = Callable[[int, int, Outcome], None]
 
 def terms() -> list[Term]:
     """All terms, in the order of a report."""
-    return [term for module in (cameras, hits, visibility, events, chains) for term in module.terms()]
+    geometry = (cameras, depths, hits, visibility, lockstep, directions, total_reflection, chains)
+    rooms = (*geometry, pictures, second_version)
+    return [term for room in rooms for term in room.terms()]
 
 
 def find_terms(names: Sequence[str]) -> list[Term]:
@@ -41,15 +54,20 @@ def run(
 
     Raises `MachineError` without Mitsuba, `SceneError` for a scene that cannot be compiled.
     """
-    work = [(scene, [term for term in terms if term.applies(scene)]) for scene in scenes]
-    total = len(precisions) * sum(len(applicable) for _, applicable in work)
+    work = [
+        (scene, precision, [term for term in terms if precision in term.precisions and term.applies(scene)])
+        for scene in scenes
+        for precision in precisions
+    ]
+    total = sum(len(applicable) for *_, applicable in work)
     outcomes: list[Outcome] = []
-    for scene, applicable in work:
-        case = Case(scene, backend=backend, rays=rays, seed=seed)
-        for precision in precisions:
-            case = case.in_precision(precision)
-            for term in applicable:
-                outcomes.append(term.run(case))
-                if progress is not None:
-                    progress(len(outcomes), total, outcomes[-1])
+    case: Case | None = None
+    for scene, precision, applicable in work:
+        if case is None or case.scene is not scene:
+            case = Case(scene, backend=backend, rays=rays, seed=seed)
+        case = case.in_precision(precision)
+        for term in applicable:
+            outcomes.append(term.run(case))
+            if progress is not None:
+                progress(len(outcomes), total, outcomes[-1])
     return outcomes

@@ -26,7 +26,8 @@ class Truth:
     """All shapes of a scene. `kind` (m,), `rows` (m, 4): n, d of a plane, center and radius of a sphere;
     `first` (m + 1,): where the triangles of each mesh begin in `corners` (t, 3, 3); `corner_normals`
     (t, 3, 3), zero for flat meshes; `flat` (m,); `usable` (t,): not degenerate; `ior` (m,); `extent`: the
-    largest |coordinate| of spheres and meshes; `lights` (k, 3): all samples, without jitter."""
+    largest |coordinate| of spheres and meshes; `lights` (k, 3): all samples, without jitter; `first_light`
+    (l + 1,): where those of each light begin."""
 
     kind: np.ndarray
     rows: np.ndarray
@@ -38,6 +39,7 @@ class Truth:
     ior: np.ndarray
     extent: float
     lights: np.ndarray
+    first_light: np.ndarray
 
     @staticmethod
     def of(scene: tracer.Scene) -> Truth:
@@ -54,7 +56,8 @@ class Truth:
             np.concatenate([b[k] for b in blocks]) if blocks else (empty if k < 2 else np.zeros(0, bool))
             for k in range(3)
         )
-        points = [light.point(k, 0.0, 0.0) for light in loader.lights() for k in range(light.samples)]
+        sources = loader.lights()
+        points = [light.point(k, 0.0, 0.0) for light in sources for k in range(light.samples)]
         return Truth(
             kind=np.array([type(g).__name__.lower() for g in geometries], dtype="U6"),
             rows=np.array([_row(g) for g in geometries]).reshape(-1, 4),
@@ -66,6 +69,7 @@ class Truth:
             ior=np.array([_ior(scene, k) for k in range(len(geometries))]),
             extent=max((float(g.extent) for g in geometries), default=0.0),
             lights=np.array(points).reshape(-1, 3),
+            first_light=np.concatenate([[0], np.cumsum([light.samples for light in sources])]).astype(int),
         )
 
     @cached_property

@@ -8,15 +8,8 @@ import tracer
 from reference import extended
 from reference.comparison import grazing
 from reference.comparison.case import Case, sizes
-from reference.comparison.judge import (
-    JUDGED,
-    LOOKED_AT,
-    SINGLE,
-    grazing_allowed,
-    guilty_side,
-    replay,
-    samples,
-)
+from reference.comparison.decisions import Decisions, judge_decisions
+from reference.comparison.judge import SINGLE, Sides
 from reference.comparison.rays import RaySet, single
 from reference.comparison.records import Outcome, Term
 from reference.comparison.truth import Truth
@@ -38,14 +31,16 @@ def has_lights(scene: tracer.Scene) -> bool:
 
 
 def ways(case: Case) -> tuple[RaySet, Array]:
-    """Our hit points, one sample of a light (n, 3) for each, and the ways between them as rays of unit
+    """From each of our hit points to every light, one of its samples (n, 3): the ways as rays of unit
     direction. Points far away are left out: both sides scale their guards by the farthest one."""
     rays, ours, truth = case.bench.rays, case.ours, case.bench.truth
     rng = np.random.default_rng([case.seed, 2])
     near = np.abs(np.nan_to_num(ours.position)).max(axis=1) <= FARTHEST * case.bench.mitsuba.extent
     k = np.flatnonzero(ours.valid & near)
-    p = ours.position[k].astype(np.float64)
-    light = single(truth.lights)[rng.integers(len(truth.lights), size=len(k))]
+    counts = np.diff(truth.first_light)
+    k, number = np.tile(k, len(counts)), np.repeat(np.arange(len(counts)), len(k))
+    sample = truth.first_light[number] + rng.integers(counts[number])
+    p, light = ours.position[k].astype(np.float64), single(truth.lights)[sample]
     length = np.linalg.norm(light - p, axis=1)
     apart = length > 10 * SHADOW_START * FARTHEST * case.bench.mitsuba.extent
     d = (light - p)[apart] / length[apart, None]
@@ -60,41 +55,24 @@ def compare_visibility(case: Case) -> Outcome:
     rays, light = ways(case)
     ours = tracer.visible(case.bench.scene, rays.o, light, precision=case.precision, backend=case.backend)
     theirs = case.bench.mitsuba.visible(rays.o, light)
-    differ = np.flatnonzero(ours != theirs)
-    guard = SHADOW_START * max(
-        case.bench.mitsuba.extent, *(np.abs(x).max(initial=0) for x in (rays.o, light))
-    )
-    near = differ[:LOOKED_AT]
-    extent = sizes(truth, rays.o[near], light[near])
-    distance = border_distance(truth, rays.o[near], light[near], guard)
-    inside = distance <= TOLERANCES["grazing band"].value * SINGLE * extent
-    outside = np.concatenate([near[~inside], differ[LOOKED_AT:]])
-    seen = exact_visibility(truth, rays.o[outside[:JUDGED]], light[outside[:JUDGED]], guard)
-    wrong = [bool((side[outside[:JUDGED]] != seen).any()) for side in (ours, theirs)]
-    worst = None
-    if len(differ):
-        k = int(outside[0] if len(outside) else differ[0])
-        answers = ["sees" if side[k] else "does not see" for side in (ours, theirs)]
-        truly = ("sees" if seen[0] else "does not see") if len(seen) else "not asked"
-        at = f" the light at {light[k].tolist()}"
-        worst = replay(case, rays, k, (answers[0] + at, answers[1] + at, truly + at))
-    kept, silhouette = samples(case, rays, np.arange(len(ours)), None)
-    return Outcome(
-        term="visibility",
-        scene=case.scene.name,
-        precision=case.precision,
-        backend=case.backend,
-        rays=len(ours),
-        measured=float(len(outside)),
-        allowed=0.0,
-        unit="rays",
-        excluded=int(inside.sum()),
-        excluded_allowed=grazing_allowed(len(ours)),
-        guilty=guilty_side(2.0 * wrong[0], 2.0 * wrong[1]) if len(outside) else "",
-        worst=worst,
-        samples=(ours != theirs)[kept].astype(np.float64),
-        distance_to_silhouette=silhouette,
-    )
+    farthest = max(np.abs(x).max(initial=0) for x in (rays.o, light))
+    guard = SHADOW_START * max(case.bench.mitsuba.extent, farthest)
+
+    def in_band(k: Array) -> Array:
+        band = TOLERANCES["grazing band"].value * SINGLE * sizes(truth, rays.o[k], light[k])
+        return border_distance(truth, rays.o[k], light[k], guard) <= band
+
+    def wrong(k: Array) -> tuple[Array, Array]:
+        seen = exact_visibility(truth, rays.o[k], light[k], guard)
+        return ours[k] != seen, theirs[k] != seen
+
+    def answers(k: int) -> Sides:
+        (exact,) = exact_visibility(truth, rays.o[k : k + 1], light[k : k + 1], guard)
+        where = f"the light at {light[k].tolist()}"
+        said = ("sees" if seen else "does not see" for seen in (ours[k], theirs[k], exact))
+        return tuple(f"{verb} {where}" for verb in said)  # type: ignore[return-value]
+
+    return judge_decisions(case, "visibility", Decisions(rays, ours != theirs, in_band, wrong, answers))
 
 
 def border_distance(truth: Truth, p: Array, light: Array, guard: float) -> Array:

@@ -7,7 +7,6 @@ reference's own color moves with the place at which its secondary rays start. Su
 
 from __future__ import annotations
 
-import copy
 from pathlib import Path
 
 import numpy as np
@@ -23,18 +22,12 @@ from tracer.assets import builtin_scenes
 pytest.importorskip("mitsuba")
 
 from reference import whitted
+from reference.comparison.canvas_moves import canvas_changes
+from reference.comparison.pictures import reference_changes
 from reference.mitsuba_scene import build
-from reference.whitted_world import START
 
 QUICK = ("glasses", "disk jitter", "transparent shadows", "smooth glass", "affine picture", "two by two")
 LONGER_SIDE = 64  # pixels of a built-in scene
-STEPS = (4, 16, 168)
-"""Moves of the canvas in roundings of S. The last is 1e-5 S: so far from the surface they leave the reference
-starts secondary rays, and so far borders of texture cells are shifted."""
-
-STARTS = (0.25, 0.5, 2.0, 4.0)
-"""Other starts of the reference's secondary rays, as factors."""
-
 COUNTED = ("total_internal", "ended_by_cutoff", "ended_by_depth", "deepest_level")
 
 
@@ -62,30 +55,10 @@ def counts_of(result: tracer.Result) -> dict[str, int]:
     return result.stats["rays"] | {key: result.stats[key] for key in COUNTED}
 
 
-def moved(scene: tracer.Scene, shift: np.ndarray) -> tracer.Scene:
-    """The scene with its canvas and eye elsewhere."""
-    twin = copy.deepcopy(scene)
-    for key in ("origin", "target") if scene.camera.is_look_at else ("position",):
-        setattr(twin.camera, key, (np.array(getattr(scene.camera, key)) + shift).tolist())
-    return twin
-
-
 def grazing(scene: tracer.Scene, theirs: np.ndarray) -> np.ndarray:
-    """(h, w): how much the color of each pixel moves when a decision by rounding is made otherwise.
-
-    The larger of two changes: of our color in double precision, when the canvas is moved, and of the
-    reference's, `theirs`, when its secondary rays start elsewhere.
-    """
-    still = tracer.render(scene, precision="double").color
-    change = np.zeros(still.shape)
-    unit = EPSILON["single"] * build(scene).extent
-    for steps in STEPS:
-        for direction in np.vstack([np.eye(3), -np.eye(3)]):
-            other = tracer.render(moved(scene, steps * unit * direction), precision="double")
-            change = np.maximum(change, np.abs(other.color - still))
-    for factor in STARTS:
-        change = np.maximum(change, np.abs(whitted.render(scene, start=factor * START).color - theirs))
-    return change.max(axis=2)
+    """(h, w): how much the color of each pixel moves when a decision by rounding is made otherwise."""
+    extent = build(scene).extent
+    return np.maximum(canvas_changes(scene, extent), reference_changes(scene, theirs, extent))
 
 
 def compare(scene: tracer.Scene) -> None:

@@ -1,0 +1,91 @@
+"""Terms of directions: after a mirror and after refraction, at the same normal."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reference import extended
+from reference.comparison import optics
+from reference.comparison.bends import Bends, bends, total_band
+from reference.comparison.case import Case
+from reference.comparison.judge import SINGLE, Numbers, bounds, judge_numbers
+from reference.comparison.kinds import by_kind, has_glass
+from reference.comparison.records import Outcome, Term
+from reference.tolerances import TOLERANCES
+
+Array = np.ndarray
+
+
+def of_kind(case: Case, b: Bends, kind: str) -> Bends:
+    """The events on shapes of a kind."""
+    return b.part(case.bench.truth.kind[b.steps.shape] == kind)
+
+
+def compare_mirror(case: Case, kind: str) -> Outcome:
+    """Directions after a mirror, in eps (1 + 2 S / r); Mitsuba's at the same, rounded, normal: in eps."""
+    b = of_kind(case, bends(case, refracts=False), kind)
+    b = b.part(gone_on(b))
+    d, n, _ = b.asked()
+    theirs, asked = optics.mirrored(d, n), extended.mirror(extended.unit(d), extended.unit(n))
+    unit = 1 + 2 * b.curve
+    return _judge(case, f"mirror, {kind}", "mirror", b, theirs, asked, unit, np.ones(len(unit)))
+
+
+def compare_refraction(case: Case, kind: str) -> Outcome:
+    """Directions after refraction in units of their conditioning, see the table of tolerances; where
+    reflection is not total, nor nearly."""
+    b = of_kind(case, bends(case, refracts=True), kind)
+    b = b.part((b.k > total_band(b, SINGLE)) & gone_on(b))
+    d, n, outward = b.asked()
+    theirs, total = optics.refracted(d, outward, case.bench.truth.ior[b.steps.shape])
+    b, d, n, theirs = b.part(~total), d[~total], n[~total], theirs[~total]
+    asked = extended.refract(extended.unit(d), extended.unit(n), extended.number(b.eta))[0]
+    root, c = np.sqrt(b.k), np.abs((b.normal * b.steps.d).sum(axis=1))
+    same_normal = 1 + (b.eta + b.eta**2) / root
+    unit = same_normal + b.curve * np.abs(b.eta * c - root) * (1 + b.eta / root)
+    return _judge(case, f"refraction, {kind}", "refraction", b, theirs, asked, unit, same_normal)
+
+
+def gone_on(b: Bends) -> Array:
+    """Mask: our chain left the vertex."""
+    return np.asarray(np.isfinite(b.steps.out).all(axis=1))
+
+
+def _judge(
+    case: Case,
+    term: str,
+    name: str,
+    b: Bends,
+    theirs: Array,
+    asked: extended.Extended,
+    unit: Array,
+    same_normal: Array,
+) -> Outcome:
+    """Both sides against their own closed form; `unit`, `same_normal`: conditioning of ours and of theirs."""
+    ours_error, theirs_error = b.steps.out - b.exact, theirs - extended.double(asked)
+    difference, ours, mitsuba = (
+        np.abs(e).max(axis=1, initial=0) for e in (ours_error - theirs_error, ours_error, theirs_error)
+    )
+    numbers = Numbers(
+        rays=b.steps.rays,
+        index=np.arange(len(ours)),
+        difference=difference / (SINGLE * unit),
+        ours=ours / (case.epsilon * unit),
+        mitsuba=mitsuba / (SINGLE * same_normal),
+        unit=TOLERANCES[name].unit,
+        answers=lambda i: (
+            f"leaves {b.steps.p[i].tolist()} along {b.steps.out[i]}",
+            f"along {theirs[i]} at the rounded normal {b.asked()[1][i].tolist()}",
+            f"along {b.exact[i]}",
+        ),
+        ulp=(case.ulps(ours), case.bench.ulps(mitsuba)),
+    )
+    return judge_numbers(case, term, numbers, bounds(case, name, "mitsuba direction"))
+
+
+def terms() -> list[Term]:
+    """Mirror and refraction by kind of shape."""
+    return [
+        *by_kind("mirror", "direction after a mirror", compare_mirror),
+        *by_kind("refraction", "direction after refraction", compare_refraction, has_glass),
+    ]

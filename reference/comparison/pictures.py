@@ -1,0 +1,139 @@
+"""The term of whole pictures: ours against the document's formula on Mitsuba's hits.
+
+Two programs, two ways to avoid self-hits, one model. A pixel may differ where a decision is grazing (a
+silhouette, an edge, the border of a shadow or of a texture's cell): its color in double precision moves when
+the canvas moves by some roundings of single precision, or the reference's own color does, or moves with the
+place at which its secondary rays start. Such pixels are counted.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+import tracer
+from reference import whitted
+from reference.comparison.canvas_moves import canvas_changes, largest_change
+from reference.comparison.case import Case
+from reference.comparison.decisions import LISTED
+from reference.comparison.judge import replay, samples
+from reference.comparison.kinds import has_shapes
+from reference.comparison.records import Guilty, Outcome, Panels, Replay, Term
+from reference.comparison.renders import render_of
+from reference.comparison.second_version import plain_colors
+from reference.tolerances import TOLERANCES
+from reference.whitted_world import START
+from tracer.compare import compare_pictures
+
+Array = np.ndarray
+
+OWN_STEPS = (4, 16)
+"""Moves of the reference's own canvas, in roundings of S: mirrors facing mirrors make much of little."""
+
+STARTS = (0.25, 0.5, 2.0, 4.0, 16.0)
+"""Other starts of the reference's secondary rays, as factors. The last is for rays that leave a triangle at a
+cosine of 1e-3: they may meet it once more beyond the usual start."""
+
+
+def reference_changes(
+    scene: tracer.Scene, theirs: Array, extent: float, supersample: int | None = None
+) -> Array:
+    """(h, w) by how much the color of each pixel of the reference moves with the canvas, and with the start
+    of its secondary rays."""
+
+    def color(canvas: tracer.Scene) -> Array:
+        return whitted.render(canvas, supersample).color
+
+    change = largest_change(color, theirs, scene, extent, OWN_STEPS)
+    for factor in STARTS:
+        other = whitted.render(scene, supersample, start=factor * START).color
+        change = np.maximum(change, np.abs(other - theirs).max(axis=2))
+    return change
+
+
+def compare_with_mitsuba(case: Case) -> Outcome:
+    """Every color of ours against the document's formula on Mitsuba's hits, visibility and directions."""
+    ours, theirs = render_of(case).result, their_picture(case)
+    apart = np.abs(ours.color - theirs.color).max(axis=2)
+    blank = (ours.depth < 0) != (theirs.depth < 0)
+    differs = (apart > TOLERANCES["color, Mitsuba"].value) | blank
+    excused = differs & (changes(case) >= apart / 2) if differs.any() else differs
+    outside = differs & ~excused
+    where = np.flatnonzero(outside)[:LISTED], np.flatnonzero(excused)
+    found = compare_pictures(ours.color, theirs.color)
+    worst = int(np.argmax(np.where(outside, 2 + apart, np.where(excused, -1, apart))))
+    guilty: Guilty = ""
+    opinions: dict[int, str] = {}
+    if len(where[0]):
+        guilty, opinions = second_opinion(case, where[0])
+    rays = render_of(case).rays
+
+    def at(k: int, in_band: bool) -> Replay:
+        own, other = (f"color {c.reshape(-1, 3)[k]}" for c in (ours.color, theirs.color))
+        return replay(case, rays, k, (own, other, opinions.get(k, "not asked")), in_band)
+
+    listed = [(int(k), False) for k in where[0]] + [(int(k), True) for k in where[1]]
+    kept, distance = samples(case, rays, np.arange(apart.size), worst)
+    return Outcome(
+        term="picture, Mitsuba",
+        scene=case.scene.name,
+        precision=case.precision,
+        backend=case.backend,
+        rays=apart.size,
+        measured=float(np.where(excused, 0, apart).max()),
+        allowed=TOLERANCES["color, Mitsuba"].value,
+        unit="display value",
+        excluded=int(excused.sum()),
+        excluded_allowed=int(np.ceil(TOLERANCES["grazing pixels"].value * apart.size)),
+        guilty=guilty,
+        worst=at(worst, bool(excused.flat[worst])),
+        samples=apart.ravel()[kept],
+        distance_to_silhouette=distance,
+        differing=tuple(at(*entry) for entry in listed[:LISTED]),
+        panels=Panels("color", ours.color, theirs.color, differs),
+        figures={
+            "\u0394E2000 mean": found.delta_e_mean,
+            "\u0394E2000 max": found.delta_e_max,
+            "RMS": found.rms,
+        },
+    )
+
+
+def their_picture(case: Case) -> whitted.Picture:
+    """The picture on Mitsuba's hits; made once a scene."""
+    memory = case.bench.memory
+    if "whitted" not in memory:
+        memory["whitted"] = whitted.render(case.bench.small, supersample=1)
+    picture: whitted.Picture = memory["whitted"]
+    return picture
+
+
+def changes(case: Case) -> Array:
+    """(h, w) the larger of both changes of color, made once a scene; in double precision also how far our
+    color in single precision is: the model's small value for borders of texture cells depends on it."""
+    memory, scene, extent = case.bench.memory, case.bench.small, case.bench.mitsuba.extent
+    if "changes" not in memory:
+        theirs = reference_changes(scene, their_picture(case).color, extent, 1)
+        memory["changes"] = np.maximum(canvas_changes(scene, extent, 1), theirs)
+    found: Array = memory["changes"]
+    if case.precision == "double":
+        single = render_of(case.in_precision("single")).result.color
+        found = np.maximum(found, np.abs(render_of(case).result.color - single).max(axis=2))
+    return found
+
+
+def second_opinion(case: Case, pixels: Array) -> tuple[Guilty, dict[int, str]]:
+    """Who is off the plain version at some pixels (numbers, row by row), and what that shows there."""
+    theirs, ours = their_picture(case), render_of(case).result
+    truth = plain_colors(case.bench.small, pixels)
+    allowed = TOLERANCES["color, Mitsuba"].value
+    wrong = [
+        bool((np.abs(side.color.reshape(-1, 3)[pixels] - truth) > allowed).any()) for side in (ours, theirs)
+    ]
+    guilty: Guilty = "both" if all(wrong) else "ours" if wrong[0] else "mitsuba" if wrong[1] else "unknown"
+    return guilty, {int(k): f"(plain) color {color}" for k, color in zip(pixels, truth, strict=True)}
+
+
+def terms() -> list[Term]:
+    """The one term."""
+    compares = "the document's formula on Mitsuba's hits, every pixel"
+    return [Term("picture, Mitsuba", compares, has_shapes, compare_with_mitsuba)]

@@ -1,0 +1,65 @@
+"""Our picture of a case, small and without depth of field, and the rays of its pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+import tracer
+from reference import extended, mitsuba_scene
+from reference.comparison.case import Case
+from reference.comparison.rays import RaySet, pixel_offset
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Render:
+    """A small picture. `scene` with that camera; `result` with depth, shape and primitive; `rays` of the
+    pixels' centers, row by row."""
+
+    scene: tracer.Scene
+    result: tracer.Result
+    rays: RaySet
+
+
+def render_of(case: Case) -> Render:
+    """The picture, one ray a pixel; rendered once a case."""
+    if "render" not in case.memory:
+        case.memory["render"] = _render(case)
+    found: Render = case.memory["render"]
+    return found
+
+
+def _render(case: Case) -> Render:
+    scene = case.bench.small
+    result = tracer.render(
+        scene, case.precision, case.backend, supersample=1, aovs=("depth", "shape", "primitive")
+    )
+    return Render(scene, result, pixel_centers(case, scene))
+
+
+def small_mitsuba(case: Case) -> mitsuba_scene.MitsubaScene:
+    """The scene of small pictures in Mitsuba; built once a scene."""
+    if "mitsuba" not in case.bench.memory:
+        case.bench.memory["mitsuba"] = mitsuba_scene.build(case.bench.small)
+    built: mitsuba_scene.MitsubaScene = case.bench.memory["mitsuba"]
+    return built
+
+
+def grid(scene: tracer.Scene) -> Array:
+    """(n, 2) column and row of every pixel, row by row."""
+    width, height = scene.camera.resolution
+    number = np.arange(width * height)
+    return np.stack([number % width, number // width], axis=1)
+
+
+def pixel_centers(case: Case, scene: tracer.Scene) -> RaySet:
+    """The rays of all pixels of a small picture, from the numbers of the scene file, in extended precision
+    rounded once to doubles. Where it is smaller than the scene's own, its pixels have no name there."""
+    pixel = grid(scene)
+    offset = pixel_offset(scene)
+    o, d = extended.camera_rays(scene.camera, pixel[:, 0] + offset, pixel[:, 1] + offset)
+    same = scene.camera.resolution == case.scene.camera.resolution
+    return RaySet(extended.double(o), extended.double(d), pixel if same else np.full_like(pixel, -1))

@@ -1,0 +1,165 @@
+"""Chains in lockstep, step by step: every bounce of our chain is a question of its own for Mitsuba.
+
+Mitsuba is given our vertex and direction, rounded to single precision, so that no error grows from bounce to
+bounce; extended precision is asked both our question and the rounded one, and what is compared is how far
+each side is off its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+import tracer
+from reference.comparison import grazing
+from reference.comparison.case import Case, sizes
+from reference.comparison.rays import RaySet, StepRays, single
+from reference.comparison.truth import MESH
+from reference.tolerances import EPSILON, TOLERANCES
+
+Array = np.ndarray
+
+CHAINS = ("RRRRRRRR", "TTTTTTTT", "RTRTRTRT", "TTRTTRTT")
+"""The events of our chains; each string gets a fourth of the rays."""
+
+CHAIN_SHARE = 4
+"""One ray in so many becomes a chain."""
+
+STEP = 1e-5
+"""Mitsuba's rays start so far along themselves, in extents S, so that they do not hit what they leave."""
+
+NEAR = 6
+"""What is hit within so many of these steps may be another thing for a ray that starts a step later."""
+
+
+@dataclass(frozen=True)
+class Chains:
+    """The rays that become chains, the events of each, and how our chains went."""
+
+    rays: RaySet
+    events: list[str]
+    path: tracer.Paths
+
+
+@dataclass(frozen=True)
+class Steps:
+    """All steps of all chains, one row each: our ray leaves `o` (n, 3) on the shape `left` (-1: none) in
+    direction `d` and reaches `p` on `shape`, `primitive` (NaN, -1: a miss); then comes the event `refracts`
+    or a mirror, and the chain leaves in direction `out` (NaN: total reflection, or the chain's end).
+    `origin`, `way`: what Mitsuba is asked; `theirs_p`, `theirs_shape`, `theirs_primitive`: its answer;
+    `vertex` (n,): which step of its chain; `first_o`, `first_d`, `pixel`, `events`: with what the chain
+    began."""
+
+    o: Array
+    d: Array
+    left: Array
+    p: Array
+    shape: Array
+    primitive: Array
+    refracts: Array
+    out: Array
+    origin: Array
+    way: Array
+    theirs_p: Array
+    theirs_shape: Array
+    theirs_primitive: Array
+    vertex: Array
+    first_o: Array
+    first_d: Array
+    pixel: Array
+    events: Array
+
+    def __len__(self) -> int:
+        return len(self.shape)
+
+    def part(self, k: Array) -> Steps:
+        """Some of the steps, by number or mask."""
+        return Steps(*(getattr(self, f.name)[k] for f in fields(self)))
+
+    @property
+    def rays(self) -> RaySet:
+        """The rays as Mitsuba was asked them."""
+        first = RaySet(self.first_o, self.first_d, self.pixel)
+        return StepRays(self.origin, self.way, self.pixel, first, self.events)
+
+
+def chains(case: Case) -> Chains:
+    """Our chains through a part of the rays; made once a case."""
+    if "chains" not in case.memory:
+        rays = case.bench.rays.part(np.arange(0, len(case.bench.rays), CHAIN_SHARE))
+        events = [CHAINS[k % len(CHAINS)] for k in range(len(rays))]
+        path = tracer.trace_path(
+            case.bench.scene, rays.o, rays.d, events, precision=case.precision, backend=case.backend
+        )
+        case.memory["chains"] = Chains(rays, events, path)
+    found: Chains = case.memory["chains"]
+    return found
+
+
+def refractions(events: list[str]) -> Array:
+    """(n, k) masks of the events T."""
+    return np.array([[event == "T" for event in row] for row in events], bool)
+
+
+def steps(case: Case) -> Steps:
+    """Our chains step by step, and Mitsuba's answers; made once a case."""
+    if "steps" not in case.memory:
+        case.memory["steps"] = _in_lockstep(case, chains(case))
+    found: Steps = case.memory["steps"]
+    return found
+
+
+def _in_lockstep(case: Case, ours: Chains) -> Steps:
+    rays, path, refracts = ours.rays, ours.path, refractions(ours.events)
+    o, d, left = rays.o, rays.d, np.full(len(rays), -1)
+    going = np.full(len(rays), True)
+    names = np.array(ours.events)
+    blocks: list[list[Array]] = []
+    for vertex in range(refracts.shape[1]):
+        k = np.flatnonzero(going)
+        if not len(k) and blocks:
+            break
+        delta = np.zeros(len(k)) if vertex == 0 else step_length(case, o[k])
+        origin, way = single(o[k] + delta[:, None] * d[k]), single(d[k])
+        hits = case.bench.mitsuba.intersect(origin, way)
+        out = path.direction[:, vertex]
+        at_vertex = [a[k, vertex] for a in (path.position, path.shape, path.primitive)]
+        blocks.append(
+            [o[k], d[k], left[k], *at_vertex, refracts[k, vertex], out[k], origin, way]
+            + [hits.p, hits.shape, hits.primitive, np.full(len(k), vertex)]
+            + [rays.o[k], rays.d[k], rays.pixel[k], names[k]]
+        )
+        going = going & (path.count > vertex) & np.isfinite(out).all(axis=1)
+        o, d, left = path.position[:, vertex], out, path.shape[:, vertex]
+    return Steps(*(np.concatenate(columns) for columns in zip(*blocks, strict=True)))
+
+
+def step_length(case: Case, o: Array) -> Array:
+    """(n,) by how much Mitsuba's rays start later than ours."""
+    return STEP * sizes(case.bench.truth, o)
+
+
+def is_near(case: Case, s: Steps, p: Array, start: Array) -> Array:
+    """Mask: points p (n, 3) lie within a few steps of where rays start; False for NaN."""
+    return np.asarray(np.linalg.norm(p - start, axis=1) < NEAR * step_length(case, s.o))
+
+
+def parted(case: Case, s: Steps) -> Array:
+    """Mask: both sides reach the same sphere, but Mitsuba's ray, which starts within rounding of it, meets it
+    again at once, while ours crosses it."""
+    again = (s.left == s.theirs_shape) & is_near(case, s, s.theirs_p, s.origin)
+    return np.asarray(again & (s.shape == s.theirs_shape) & ~is_near(case, s, s.p, s.o))
+
+
+def agreed_steps(case: Case) -> Steps:
+    """The steps that reach the same primitive at the same place, away from the edges of triangles, where the
+    normal is in doubt."""
+    truth, s = case.bench.truth, steps(case)
+    same = (s.shape == s.theirs_shape) & (s.primitive == s.theirs_primitive)
+    s = s.part((s.shape >= 0) & same & ~parted(case, s))
+    sure = np.ones(len(s), bool)
+    k = np.flatnonzero(truth.kind[s.shape] == MESH)
+    inner = grazing.inner_distance(s.p[k], truth.triangles(s.shape[k], s.primitive[k]))
+    sure[k] = inner > TOLERANCES["grazing band"].value * EPSILON["single"] * sizes(truth, s.o[k], s.p[k])
+    return s.part(sure)
