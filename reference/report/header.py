@@ -12,8 +12,6 @@ from collections.abc import Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 
-import drjit as dr
-
 import tracer
 from reference.mitsuba_variant import mitsuba
 from tracer.doctor import DISTRIBUTION
@@ -27,6 +25,8 @@ def header_of(command: str, precisions: Sequence[str], backend: str, rays: int, 
     """Name and value, in the order of a report; `rays` are those of a scene. Raises `MachineError` without
     Mitsuba or LLVM."""
     ensure_llvm()
+    import drjit as dr  # not before an LLVM was chosen for it
+
     other = mitsuba()
     commit = _commit(Path(tracer.__file__).resolve().parents[1])
     return {

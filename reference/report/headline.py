@@ -31,9 +31,9 @@ class Peak:
 
 @dataclass(frozen=True)
 class Headline:
-    """`questions` with their answers that differ `outside` and `inside` the grazing band; the largest errors
-    against extended precision of each side, and the number of all `nearest` to its bound (None: there is
-    none)."""
+    """What was compared, leaving out terms that no ray of a scene met: `questions` with their answers that
+    differ `outside` and `inside` the grazing band; the largest errors of each side against extended
+    precision, and the number of all that is `nearest` to its bound (None: there is none)."""
 
     scenes: int
     terms: int
@@ -49,7 +49,7 @@ class Headline:
     @staticmethod
     def of(validation: Validation) -> Headline:
         """The numbers of a run."""
-        outcomes = validation.outcomes
+        outcomes = [outcome for outcome in validation.outcomes if outcome.rays or not outcome.passed]
         asked = [outcome for outcome in outcomes if outcome.term in QUESTIONS]
         return Headline(
             scenes=len({outcome.scene for outcome in outcomes}),

@@ -87,9 +87,7 @@ def _cells(row: TermRow) -> list[str]:
     over = worst.excluded > worst.excluded_allowed
     return [
         row.term,
-        "passed"
-        if worst.passed
-        else f"**{row.failed} failed**" + (f" ({worst.guilty})" * bool(worst.guilty)),
+        _verdict(row),
         number(row.scenes),
         worst.scene,
         number(row.rays),
@@ -100,6 +98,12 @@ def _cells(row: TermRow) -> list[str]:
         *(_error(bound) for bound in (row.single, row.double, row.mitsuba)),
         number(row.grazing) + (f" (here {worst.excluded} of {worst.excluded_allowed})" if over else ""),
     ]
+
+
+def _verdict(row: TermRow) -> str:
+    if row.worst.passed:
+        return "passed" if row.rays else "no rays"
+    return f"**{row.failed} failed**" + (f" ({row.worst.guilty})" if row.worst.guilty else "")
 
 
 def _error(bound: Bound | None) -> str:

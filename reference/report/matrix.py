@@ -17,7 +17,8 @@ CLASSES = 10
 
 @dataclass(frozen=True)
 class Cell:
-    """One square: `shade` from 0 to CLASSES, `text` in it (percent), `says` what is under it."""
+    """One square: `shade` from 0 to CLASSES, `text` in it (percent; empty: no ray met the term), `says` what
+    is under it."""
 
     shade: int
     passed: bool
@@ -61,6 +62,8 @@ def shade(share: float) -> int:
 
 def _cell(worst: Outcome) -> Cell:
     share, bound = used(worst), tightest(worst)
+    if not worst.rays and worst.passed:
+        return Cell(0, True, "", f"{worst.term}, {worst.scene}: no ray met it")
     if worst.passed:
         text = "0" if not share else "<1" if share < 0.01 else f"{100 * share:.0f}"
     else:

@@ -8,6 +8,7 @@ from pathlib import Path
 import jinja2
 
 from reference.comparison.records import Validation
+from reference.comparison.run import terms as all_terms
 from reference.report import bounds, numbers
 from reference.report.header import COMMAND
 from reference.report.headline import Headline
@@ -52,6 +53,7 @@ def page(validation: Validation) -> str:
         summary=term_rows(validation.outcomes),
         outcomes=bounds.failures_first(validation.outcomes),
         terms=terms,
+        compares={term.name: term.compares for term in all_terms()},
         rows=rows,
         shades=CLASSES,
         sections=sections,

@@ -15,8 +15,9 @@ from reference.report.numbers import number
 Array = np.ndarray
 
 LOSSLESS = 101  # what OpenCV takes for it
-MORE, LESS = (0xC8, 0x50, 0x0A), (0x0B, 0x6F, 0xB8)
-"""Red, green, blue where ours is larger, and where Mitsuba's is; nothing is drawn where they agree."""
+MORE, LESS = (0xE0, 0x69, 0x14), (0x1F, 0x86, 0xD8)
+"""Red, green, blue where ours is larger, and where Mitsuba's is; nothing is drawn where they agree. Both
+stand out on light and on dark paper."""
 ONE_SIDED = (0x80, 0x80, 0x80, 0xFF)
 STEPS = 15
 """Shades a sign: more would be noise to the eye, and to the codec."""
@@ -29,7 +30,8 @@ RINGS = 300
 @dataclass(frozen=True)
 class Trio:
     """Data URIs of the three pictures and what is said of them. `range` is the symmetric range of the bar,
-    in words (empty: no pixel differs); `beyond` counts the pixels outside it; `rings`: centers [pixels]."""
+    in words (empty: no pixel differs); `beyond` counts the pixels outside it; `rings`: centers of circles
+    with that `radius` [pixels]."""
 
     kind: str
     ours: str
@@ -43,6 +45,7 @@ class Trio:
     beyond: int
     differing: int
     one_sided: int
+    radius: float
     rings: list[tuple[float, float]]
     near: str = ""
     far: str = ""
@@ -78,6 +81,7 @@ def trio_of(panels: Panels) -> Trio:
         beyond=int((np.abs(difference) > limit * (1 + EXACT)).sum()),
         differing=int(differs.sum()),
         one_sided=int(one_sided.sum()),
+        radius=max(1.4, differs.shape[1] / 50),
         rings=[(float(x) + 0.5, float(y) + 0.5) for x, y in zip(columns, rows, strict=True)][:RINGS],
         near=near,
         far=far,
@@ -92,10 +96,10 @@ def thumbnail(panels: Panels) -> str:
     return _uri(np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA)), 70)
 
 
-def bar(colors: tuple[tuple[int, int, int], tuple[int, int, int]] = (LESS, MORE)) -> str:
+def bar() -> str:
     """The color bar of a difference as stops of a CSS gradient, see-through in the middle."""
-    (r0, g0, b0), (r1, g1, b1) = colors
-    return f"rgb({r0} {g0} {b0}), rgb({r0} {g0} {b0} / 0), rgb({r1} {g1} {b1} / 0), rgb({r1} {g1} {b1})"
+    less, more = (" ".join(map(str, color)) for color in (LESS, MORE))
+    return f"rgb({less}) 0%, rgb({less} / 0) 50%, rgb({more} / 0) 50%, rgb({more}) 100%"
 
 
 def viridis_bar(count: int = 9) -> str:

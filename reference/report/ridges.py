@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from reference.comparison.records import Outcome
 from reference.report import svg
 
-ROW, LEFT, WIDTH = 0.36, 1.45, 4.75  # inches
+ROW, LEFT, WIDTH = 0.36, 1.8, 4.6  # inches
 LEAST_BINS = 14
-HIGHEST = 1.15  # of a ridge, in rows
+HIGHEST = 0.92  # of a ridge, in rows
 TICKS = {0: "0", 4: "⅛", 7: "1", 10: "8", 13: "64", 16: "512", 19: "4,096", 22: "2¹⁵", 25: "2¹⁸",
          28: "2²¹", 31: "2²⁴"}  # fmt: skip
 """Borders of the bins of a spectrum, by number, and what they are in ulp."""
@@ -60,7 +60,8 @@ def draw_ridges(outcomes: Sequence[Outcome]) -> Figure | None:
 
 
 def _rows(outcomes: Sequence[Outcome]) -> dict[str, dict[str, Ridge]]:
-    """By term and side; the highest bin of a row is as high as any other row's."""
+    """By term and side; the highest bin of a row is as high as any other row's, not counting what is exact,
+    which may be nearly all: its bin, the first, is cut off there."""
     counts: dict[str, dict[str, np.ndarray]] = {}
     for outcome in outcomes:
         if outcome.spectrum is not None:
@@ -71,8 +72,10 @@ def _rows(outcomes: Sequence[Outcome]) -> dict[str, dict[str, Ridge]]:
     for term, row in counts.items():
         shares = {side: values / values.sum() for side, values in row.items() if values.any()}
         if shares:
-            top = max(share.max() for share in shares.values()) / HIGHEST
-            rows[term] = {side: _ridge(share / top) for side, share in shares.items()}
+            top = max(share[1:].max() for share in shares.values()) or 1.0
+            rows[term] = {
+                side: _ridge(HIGHEST * np.minimum(share / top, 1)) for side, share in shares.items()
+            }
     return rows
 
 

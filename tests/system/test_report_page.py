@@ -11,7 +11,7 @@ import cv2
 import pytest
 
 from reference.report import write_report
-from tests.outcomes import failing_run
+from tests.outcomes import COMMAND, failing_run
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page, Route
@@ -101,6 +101,25 @@ def test_a_picture_is_swapped_with_the_keyboard(page: Page) -> None:
     page.keyboard.press("Space")
     page.keyboard.press("Tab")
     assert image.get_attribute("src") == source and ours.get_attribute("aria-pressed") == "false"
+
+
+def test_a_picture_is_swapped_by_a_tap_and_back_by_another(browser: Browser, file: Path) -> None:
+    page = browser.new_page(has_touch=True, viewport={"width": 400, "height": 800})
+    page.goto(file.as_uri())
+    ours = page.locator("details[open] .trio .swap").first
+    image, source = ours.locator("img"), ours.locator("img").get_attribute("src")
+    ours.tap()
+    assert image.get_attribute("src") != source
+    ours.tap()
+    assert image.get_attribute("src") == source
+    page.close()
+
+
+def test_a_command_is_copied(context: BrowserContext, page: Page) -> None:
+    context.grant_permissions(["clipboard-read", "clipboard-write"])
+    page.locator("header .copy").click()
+    page.wait_for_function("document.querySelector('header .copy').textContent === 'Copied'")
+    assert page.evaluate("navigator.clipboard.readText()") == COMMAND
 
 
 def test_the_look_follows_the_system_until_the_button_says_otherwise(page: Page) -> None:

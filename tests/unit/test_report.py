@@ -107,6 +107,14 @@ def test_the_headline_counts_questions_of_each_precision_once() -> None:
     assert line.nearest is not None and line.nearest.margin == 8 / 3
 
 
+def test_a_term_that_no_ray_met_is_no_comparison(tmp_path: Path) -> None:
+    run = run_of(hits(), distances(rays=0, measured=0.0))
+    assert Headline.of(run).outcomes == 1
+    assert "no ray met it" in (matrix(run.outcomes)[1]["room"][1] or pytest.fail()).says
+    assert "| distance, plane | no rays |" in summary_markdown(run)
+    assert "no rays" in written(tmp_path, run).words
+
+
 def test_failures_come_first_everywhere() -> None:
     run = failing_run()
     assert failures_first(run.outcomes)[0] is run.outcomes[-1]
@@ -176,7 +184,7 @@ def test_a_run_without_outcomes_says_so(tmp_path: Path) -> None:
 
 def test_a_scene_without_pictures_and_differing_rays_says_so(tmp_path: Path) -> None:
     words = written(tmp_path, run_of(hits(differing=(), excluded=0))).words
-    assert "All 1 comparisons passed" in words
+    assert "The one comparison passed" in words
     assert "No picture was compared in this scene." in words and "No differing ray is listed." in words
 
 
