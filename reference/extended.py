@@ -142,11 +142,22 @@ def refract(d: Any, n: Any, eta: Any) -> tuple[Extended, Extended]:
 def camera_rays(camera: Camera, columns: Any, rows: Any) -> tuple[Extended, Extended]:
     """Origins and unit directions of the rays through canvas points in pixels from the top-left corner
     (document, section 7), from the numbers of the scene file."""
-    center, x, y, forward, pixel_size = _look_at(camera) if camera.is_look_at else _canvas(camera)
+    center, x, y, forward, pixel_size = frame(camera)
     width, height = camera.resolution
     across = (number(columns) - number(width / 2))[:, None] * pixel_size * x
     across = across + (number(rows) - number(height / 2))[:, None] * pixel_size * y
     return center + across, unit(number(camera.eye_distance) * forward + across)
+
+
+def pixel_offset(camera: Camera, literal: bool) -> float:
+    """The place of a ray in its pixel, 0 to 1 in both directions."""
+    own = camera.pixel_offset
+    return (0.0 if literal else 0.5) if own is None else own
+
+
+def frame(camera: Camera) -> tuple[Extended, Extended, Extended, Extended, Extended]:
+    """Canvas center, unit vectors to the right, down and forward, and the size of a pixel."""
+    return _look_at(camera) if camera.is_look_at else _canvas(camera)
 
 
 def _canvas(camera: Camera) -> tuple[Extended, Extended, Extended, Extended, Extended]:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from reference import extended
 from reference.adapters import body_of, sensor_of
 from reference.adapters.extent import extent_of
 from reference.adapters.geometry import Perspective, Triangles
@@ -161,7 +162,7 @@ def build(scene: Scene, supersample: int = 1, canvas: Canvas | None = None) -> M
     """
     mi = mitsuba()
     scene.check()
-    canvas = canvas or Canvas.of(scene.camera, scene.literal)
+    canvas = canvas or exact_canvas(scene)
     meshes = placed_meshes(scene)
     extent = extent_of(scene, canvas, meshes)
     around = Surroundings(scene, meshes, extent)
@@ -185,6 +186,23 @@ def build(scene: Scene, supersample: int = 1, canvas: Canvas | None = None) -> M
         first_view=first,
         shape_of=_shape_table(built, numbers),
         primitives={n: body.numbers for n, body in bodies.items() if isinstance(body, Triangles)},
+    )
+
+
+def exact_canvas(scene: Scene) -> Canvas:
+    """The canvas of a scene by closed forms: an error of the tracer's own pose is not repeated here."""
+    camera, (width, height) = scene.camera, scene.camera.resolution
+    center, x, y, forward, pixel_size = (extended.double(value) for value in extended.frame(camera))
+    return Canvas(
+        center=center,
+        x=x,
+        y=y,
+        forward=forward,
+        distance=camera.eye_distance,
+        width=width,
+        height=height,
+        pixel_size=float(pixel_size),
+        offset=extended.pixel_offset(camera, scene.literal),
     )
 
 

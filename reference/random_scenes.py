@@ -17,6 +17,10 @@ MATERIALS: dict[str, dict[str, float]] = {
 }
 
 
+RESOLUTION = (192, 144)
+"""Columns and rows of a picture."""
+
+
 def random_scene(seed: int) -> tracer.Scene:
     """Scene number `seed`, named `random-SEED`: 1 to 3 planes, 2 to 8 spheres, 1 to 4 solids around a point
     that lies up to two sizes off the origin, all in view of a turned camera, and two lights."""
@@ -27,7 +31,9 @@ def random_scene(seed: int) -> tracer.Scene:
     shapes += [_sphere(rng, middle, size) for _ in range(rng.integers(2, 9))]
     shapes += [_solid(rng, middle, size) for _ in range(rng.integers(1, 5))]
     order = rng.permutation(len(shapes))
+    colors = np.random.default_rng([seed, 1]).uniform(0.35, 1, (len(shapes), 3))
     table = {
+        "background": "#101820",
         "camera": _camera(rng, middle, size),
         "lights": [
             {
@@ -43,7 +49,10 @@ def random_scene(seed: int) -> tracer.Scene:
             },
         ],
         "materials": MATERIALS,
-        "shapes": [shapes[k] | {"name": f"shape {n}"} for n, k in enumerate(order)],
+        "shapes": [
+            shapes[k] | {"name": f"shape {n}", "color": color}
+            for (n, k), color in zip(enumerate(order), colors.tolist(), strict=True)
+        ],
     }
     return tracer.load(table).come_from(name=f"random-{seed}", label=f"random-{seed}")
 
@@ -89,7 +98,7 @@ def _camera(rng: np.random.Generator, middle: np.ndarray, size: float) -> dict[s
     if rng.random() < 0.5:
         eye = middle + 0.95 * size * _direction(rng)
         return {
-            "resolution": [96, 72],
+            "resolution": list(RESOLUTION),
             "origin": eye.tolist(),
             "target": (middle + 0.2 * size * _direction(rng)).tolist(),
             "up": _direction(rng).tolist(),
@@ -97,9 +106,9 @@ def _camera(rng: np.random.Generator, middle: np.ndarray, size: float) -> dict[s
         }
     angles = rng.uniform(-180, 180, 2)
     return {
-        "resolution": [96, 72],
+        "resolution": list(RESOLUTION),
         "position": (middle + 0.3 * size * _direction(rng)).tolist(),
         "distance": float(size * rng.uniform(0.1, 0.5)),
-        "pixel_size": float(size / 96 * rng.uniform(0.3, 1)),
+        "pixel_size": float(size / RESOLUTION[0] * rng.uniform(0.3, 1)),
         "rotate": angles.tolist(),
     }

@@ -3,8 +3,19 @@
 from __future__ import annotations
 
 from reference.comparison.case import Case
-from reference.comparison.records import Growth, Outcome, Replay, Term
-from reference.comparison.run import find_terms, run
+from reference.comparison.records import Growth, Outcome, Replay, Term, Validation
+from reference.comparison.run import Progress, find_terms, run
 from reference.comparison.run import terms as all_terms
 
-__all__ = ["Case", "Growth", "Outcome", "Replay", "Term", "all_terms", "find_terms", "run"]
+__all__ = [
+    "Case",
+    "Growth",
+    "Outcome",
+    "Progress",
+    "Replay",
+    "Term",
+    "Validation",
+    "all_terms",
+    "find_terms",
+    "run",
+]

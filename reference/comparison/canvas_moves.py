@@ -25,9 +25,7 @@ def moved(scene: tracer.Scene, shift: Array) -> tracer.Scene:
     return scene.model_copy(update={"camera": camera.model_copy(update=update)})
 
 
-def canvas_changes(
-    scene: tracer.Scene, extent: float, supersample: int | None = None
-) -> Array:
+def canvas_changes(scene: tracer.Scene, extent: float, supersample: int | None = None) -> Array:
     """(h, w) by how much the color of each pixel, in double precision, moves with the canvas; `extent`: S."""
 
     def color(canvas: tracer.Scene) -> Array:

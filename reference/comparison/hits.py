@@ -48,7 +48,15 @@ class Agreed:
 
 
 def agreed(case: Case, kind: str) -> Agreed:
-    """Where numbers can be compared; the rim of a sphere is left to the term of hits."""
+    """Where numbers can be compared; the rim of a sphere is left to the term of hits. Made once a case."""
+    key = f"agreed {kind}"
+    if key not in case.memory:
+        case.memory[key] = _agreed(case, kind)
+    found: Agreed = case.memory[key]
+    return found
+
+
+def _agreed(case: Case, kind: str) -> Agreed:
     truth, rays, ours = case.bench.truth, case.bench.rays, case.ours
     k = np.flatnonzero(case.same & ours.valid)
     k = k[truth.kind[ours.shape[k]] == kind]

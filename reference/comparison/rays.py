@@ -72,18 +72,12 @@ def _parts(rays: RaySet) -> tuple[Array, Array, Array]:
     return rays.o, rays.d, rays.pixel
 
 
-def pixel_offset(scene: tracer.Scene) -> float:
-    """The place of a ray in its pixel."""
-    own = scene.camera.pixel_offset
-    return (0.0 if scene.literal else 0.5) if own is None else own
-
-
 def pixel_rays(scene: tracer.Scene, count: int, rng: np.random.Generator) -> RaySet:
     """Rays through pixels chosen at random, none twice."""
     width, height = scene.camera.resolution
     number = rng.permutation(width * height)[:count]
     pixel = np.stack([number % width, number // width], axis=1)
-    offset = pixel_offset(scene)
+    offset = extended.pixel_offset(scene.camera, scene.literal)
     o, d = extended.camera_rays(scene.camera, pixel[:, 0] + offset, pixel[:, 1] + offset)
     return RaySet(single(extended.double(o)), single(extended.double(d)), pixel)
 

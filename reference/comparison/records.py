@@ -13,7 +13,7 @@ import tracer
 if TYPE_CHECKING:
     from reference.comparison.case import Case
 
-Guilty = Literal["", "ours", "mitsuba", "both", "unknown"]
+Guilty = Literal["", "ours", "mitsuba", "both", "unknown", "cuda", "llvm"]
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 import tracer
 from reference import extended, mitsuba_scene
 from reference.comparison.case import Case
-from reference.comparison.rays import RaySet, pixel_offset
+from reference.comparison.rays import RaySet
 
 Array = np.ndarray
 
@@ -59,7 +59,7 @@ def pixel_centers(case: Case, scene: tracer.Scene) -> RaySet:
     """The rays of all pixels of a small picture, from the numbers of the scene file, in extended precision
     rounded once to doubles. Where it is smaller than the scene's own, its pixels have no name there."""
     pixel = grid(scene)
-    offset = pixel_offset(scene)
+    offset = extended.pixel_offset(scene.camera, scene.literal)
     o, d = extended.camera_rays(scene.camera, pixel[:, 0] + offset, pixel[:, 1] + offset)
     same = scene.camera.resolution == case.scene.camera.resolution
     return RaySet(extended.double(o), extended.double(d), pixel if same else np.full_like(pixel, -1))

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import tracer
 from reference.comparison import (
+    backends,
     cameras,
     chains,
     depths,
@@ -28,7 +29,7 @@ Progress = Callable[[int, int, Outcome], None]
 def terms() -> list[Term]:
     """All terms, in the order of a report."""
     geometry = (cameras, depths, hits, visibility, lockstep, directions, total_reflection, chains)
-    rooms = (*geometry, pictures, second_version)
+    rooms = (*geometry, pictures, second_version, backends)
     return [term for room in rooms for term in room.terms()]
 
 

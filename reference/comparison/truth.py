@@ -16,6 +16,7 @@ import numpy as np
 import tracer
 from reference import extended, plain
 from reference.extended import Extended
+from tracer.material import Material
 from tracer.shapes import Instance
 
 PLANE, SPHERE, MESH = "plane", "sphere", "mesh"
@@ -66,7 +67,7 @@ class Truth:
             corner_normals=normals,
             flat=np.array([mesh is None or mesh.corner_normals is None for mesh in meshes], bool),
             usable=usable,
-            ior=np.array([_ior(scene, k) for k in range(len(geometries))]),
+            ior=np.array([material_of(scene, k).ior for k in range(len(geometries))]),
             extent=max((float(g.extent) for g in geometries), default=0.0),
             lights=np.array(points).reshape(-1, 3),
             first_light=np.concatenate([[0], np.cumsum([light.samples for light in sources])]).astype(int),
@@ -223,9 +224,9 @@ def _mesh_arrays(mesh: plain.Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return corners, normals, np.array([any(n) for n in mesh.normals])
 
 
-def _ior(scene: tracer.Scene, number: int) -> float:
-    """The index of refraction of a shape; an instance without a material has that of its mesh."""
+def material_of(scene: tracer.Scene, number: int) -> Material:
+    """The material of a shape; an instance without one has that of its mesh."""
     shape = scene.shapes[number]
     if shape.material is None and isinstance(shape, Instance):
-        return _ior(scene, next(k for k, other in enumerate(scene.shapes) if other.name == shape.of))
-    return scene.materials[shape.material].ior if shape.material is not None else 1.0
+        return material_of(scene, next(k for k, other in enumerate(scene.shapes) if other.name == shape.of))
+    return scene.materials[shape.material] if shape.material is not None else Material()

@@ -63,23 +63,33 @@ def headline_lines(validation: Validation) -> list[str]:
     return [*lines, f"- Largest errors against extended precision: {'; '.join(shown)}."] if shown else lines
 
 
-def rewrite_headline(path: str | os.PathLike[str], validation: Validation) -> None:
-    """Puts the headline between the two markers of a Markdown file. Raises UsageError where one is missing or
-    the file cannot be read, OutputError where it cannot be written."""
+def headline_place(path: str | os.PathLike[str]) -> tuple[str, str]:
+    """The text of a Markdown file before and after its headline, the markers included. Raises UsageError
+    where a marker is missing or the file cannot be read."""
     try:
         text = Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"{os.fspath(path)}: cannot be read: {error}") from error
+        reason = getattr(error, "strerror", None) or "it is not UTF-8"
+        raise UsageError(f"{os.fspath(path)}: cannot be read: {reason}") from error
     before, begin, rest = text.partition(BEGIN)
     _, end, after = rest.partition(END)
     for marker, found in ((BEGIN, begin), (END, end)):
         if not found:
             place = "" if marker == BEGIN else f" after {BEGIN}"
-            raise UsageError(f'{os.fspath(path)}: the marker "{marker}" is missing{place}; the headline goes '
-                             f"between {BEGIN} and {END}")  # fmt: skip
+            raise UsageError(
+                f'{os.fspath(path)}: the marker "{marker}" is missing{place}; the headline goes between '
+                f"{BEGIN} and {END}"
+            )
+    return before + begin, end + after
+
+
+def rewrite_headline(path: str | os.PathLike[str], validation: Validation) -> None:
+    """Puts the headline between the two markers of a Markdown file. Raises UsageError as `headline_place`,
+    OutputError where the file cannot be written."""
+    before, after = headline_place(path)
     block = "\n".join(headline_lines(validation))
     with atomic_write(path) as temporary:
-        temporary.write_text(f"{before}{BEGIN}\n{block}\n{END}{after}", encoding="utf-8")
+        temporary.write_text(f"{before}\n{block}\n{after}", encoding="utf-8")
 
 
 def _cells(row: TermRow) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from typing import Any
 
 import drjit as dr
@@ -13,10 +14,12 @@ import pytest
 
 import tracer
 from reference.comparison import Outcome, find_terms, run
+from reference.mitsuba_scene import MitsubaScene
 from reference.random_scenes import random_scene
 from tracer import canvas as canvas_module
-from tracer import device_scene, intersection, queries
+from tracer import device_scene, intersection, light_tables, queries
 from tracer.canvas import DeviceCanvas
+from tracer.material import Material
 from tracer.ray import Hit, Ray
 from tracer.shapes import Plane, Sphere, sphere
 from tracer.shapes.sphere import SphereSlot
@@ -144,6 +147,47 @@ def farther_hit_kept(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(sphere, "keep_nearer", keep_later)
 
 
+def light_weights_not_normalized(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(light_tables.math, "fsum", lambda weights: 1.0)
+
+
+def absorbed_share_is_one(patch: pytest.MonkeyPatch) -> None:
+    """A mirror shines by its own light in full, as if nothing were reflected."""
+    patch.setattr(Material, "absorption", property(lambda material: 1.0))
+
+
+def cutoff_doubled(patch: pytest.MonkeyPatch) -> None:
+    """Rays end at twice the weight that the scene names."""
+    module = import_module("tracer.render")  # the package gives the name to the function
+    true = module.compile_scene
+
+    def coarse(scene: tracer.Scene, backend: Any) -> Any:
+        return true(scene.model_copy(update={"cutoff": 2 * scene.cutoff}), backend)
+
+    patch.setattr(module, "compile_scene", coarse)
+
+
+def mitsuba_hits_too_far(patch: pytest.MonkeyPatch) -> None:
+    """An error of the other side: its distances are 1e-4 too long."""
+    true = MitsubaScene.intersect
+
+    def stretched(scene: MitsubaScene, o: Any, d: Any, t_max: Any = None) -> Any:
+        hits = true(scene, o, d, t_max)
+        return replace(hits, t=1.0001 * hits.t, p=hits.p + 1e-4 * hits.t[:, None] * d)
+
+    patch.setattr(MitsubaScene, "intersect", stretched)
+
+
+def mitsuba_normals_flipped(patch: pytest.MonkeyPatch) -> None:
+    true = MitsubaScene.intersect
+
+    def flipped(scene: MitsubaScene, o: Any, d: Any, t_max: Any = None) -> Any:
+        hits = true(scene, o, d, t_max)
+        return replace(hits, n=-hits.n)
+
+    patch.setattr(MitsubaScene, "intersect", flipped)
+
+
 CATCHES: list[tuple[Plant, str, str, str]] = [
     (normal_flipped, "normal, sphere", "double", "ours"),
     (normal_flipped, "normal, sphere", "single", "ours"),
@@ -155,8 +199,7 @@ CATCHES: list[tuple[Plant, str, str, str]] = [
     (depth_from_the_eye, "camera rays", "single", "ours"),
     (image_mirrored, "camera rays", "single", "ours"),
     (image_mirrored, "depth buffer, mask", "single", "ours"),
-    # The adapter of the camera starts from our pose, so Mitsuba is turned the wrong way too.
-    (rotation_reversed, "camera rays", "double", "both"),
+    (rotation_reversed, "camera rays", "double", "ours"),
     (triangle_dropped, "hits", "double", "ours"),
     (single_for_double, "distance, sphere", "double", "ours"),
     (single_for_double, "mirror, sphere", "double", "ours"),
@@ -166,6 +209,13 @@ CATCHES: list[tuple[Plant, str, str, str]] = [
     (mirror_about_another_normal, "mirror, sphere", "double", "ours"),
     (no_departure, "lockstep, next hit", "single", "ours"),
     (farther_hit_kept, "hits", "single", "ours"),
+    (light_weights_not_normalized, "picture, Mitsuba", "single", "ours"),
+    (light_weights_not_normalized, "picture, plain", "double", "ours"),
+    (absorbed_share_is_one, "picture, Mitsuba", "single", "ours"),
+    (cutoff_doubled, "rays counted, plain", "double", "ours"),
+    (mitsuba_hits_too_far, "distance, sphere", "double", "mitsuba"),
+    (mitsuba_hits_too_far, "chain growth", "double", "mitsuba"),
+    (mitsuba_normals_flipped, "normal, mesh", "single", "mitsuba"),
 ]
 
 
@@ -190,7 +240,7 @@ def test_a_planted_error_is_caught(
     found = outcome(term, precision)
     assert not found.passed, f"{term} did not notice: {found}"
     assert found.guilty == guilty, str(found)
-    assert found.worst is not None and found.worst.command
+    assert found.worst is None or found.worst.command.startswith("tracer validate ")
 
 
 @pytest.mark.slow

@@ -17,6 +17,7 @@ from tracer.cli.info import info
 from tracer.cli.interruption import Interruption
 from tracer.cli.render import render
 from tracer.cli.scenes import scenes
+from tracer.cli.validate import validate
 from tracer.version import __version__
 
 
@@ -43,7 +44,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (render, classic, scenes, info, compare, export, doctor):
+for _command in (render, classic, scenes, info, compare, validate, export, doctor):
     cli.add_command(_command)
 
 

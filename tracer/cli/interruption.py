@@ -97,4 +97,4 @@ class Interruption:
 
     def _say_that_it_waits(self) -> None:
         if self._deferred and not self.quiet:
-            os.write(2, b"\ntracer: stopping after the rows in work; once more quits at once\n")
+            os.write(2, b"\ntracer: stopping after the work in hand; once more quits at once\n")

@@ -1,0 +1,150 @@
+"""A run as `tracer validate` asks for it: which scenes and terms, and which files it writes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import tracer
+from reference.comparison import Outcome, Progress, Term, Validation, all_terms, find_terms, run
+from reference.comparison.selection import FULL_RAYS, STANDARD_RAYS, chosen_scenes
+from reference.report import (
+    header_of,
+    headline_place,
+    rewrite_headline,
+    summary_markdown,
+    write_json,
+    write_report,
+)
+from tracer.backends import find_backend, has_cuda
+from tracer.errors import OutputError
+from tracer.film.atomic import atomic_write, check_writable
+from tracer.scene import load
+
+PAGE, TWIN, PARTIAL_PAGE = "index.html", "index.json", "index.partial.html"
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is to be compared. `scenes`: files and names; `rays`: a scene, None: as `full` says; `backend`:
+    ours; `command`: the line that repeats the run."""
+
+    scenes: tuple[str, ...]
+    full: bool
+    random: int | None
+    seed: int
+    rays: int | None
+    terms: tuple[str, ...]
+    precisions: tuple[str, ...]
+    backend: str
+    overrides: tuple[str, ...]
+    allow_outside: bool
+    command: str
+
+    def load_scenes(self) -> list[tracer.Scene]:
+        """The scenes; raises `SceneError`."""
+
+        def load_one(name: str) -> tracer.Scene:
+            return load(name, allow_outside=self.allow_outside, overrides=self.overrides)
+
+        return chosen_scenes(self.scenes, self.full, self.random, self.seed, load_one)
+
+    def find_terms(self) -> list[Term]:
+        """The terms; raises `UsageError` for one that does not exist."""
+        return find_terms(self.terms) if self.terms else all_terms()
+
+    @property
+    def rays_a_scene(self) -> int:
+        """How many rays each scene gets."""
+        return self.rays or (FULL_RAYS if self.full else STANDARD_RAYS)
+
+    @property
+    def processor(self) -> str:
+        """Our backend, with `auto` decided; raises `MachineError` where the machine lacks it."""
+        return str(find_backend(self.backend, "double").name)
+
+
+@dataclass(frozen=True)
+class Files:
+    """Where results go: the page and its twin in the folder `out`; `json`, `summary`, `headline`: files of
+    their own, if asked for."""
+
+    out: str
+    json: str | None = None
+    summary: str | None = None
+    headline: str | None = None
+
+    def check(self) -> None:
+        """Refuses what could not be written, before a long run; makes the folder. Raises `OutputError`, and
+        `UsageError` for a headline without a place."""
+        try:
+            os.makedirs(self.out, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"{self.out}: the folder cannot be made: {error.strerror}") from error
+        wanted = [(os.path.join(self.out, name), (Path(name).suffix,)) for name in (PAGE, TWIN)]
+        wanted += [(file, (".json",)) for file in (self.json,) if file]
+        wanted += [(file, (".md",)) for file in (self.summary, self.headline) if file]
+        for file, suffixes in wanted:
+            check_writable(file, suffixes)
+        if self.headline:
+            headline_place(self.headline)
+
+    def write(self, validation: Validation) -> list[str]:
+        """Writes all files and returns their names."""
+        page, twin = (os.path.join(self.out, name) for name in (PAGE, TWIN))
+        write_report(page, validation)
+        write_json(twin, validation)
+        written = [page, twin]
+        if self.json:
+            write_json(self.json, validation)
+            written.append(self.json)
+        if self.summary:
+            with atomic_write(self.summary) as temporary:
+                temporary.write_text(summary_markdown(validation), encoding="utf-8")
+            written.append(self.summary)
+        if self.headline:
+            rewrite_headline(self.headline, validation)
+            written.append(self.headline)
+        return written
+
+    def write_partial(self, validation: Validation) -> str:
+        """Writes the page of a run that was stopped, under a name of its own."""
+        page = os.path.join(self.out, PARTIAL_PAGE)
+        write_report(page, validation)
+        return page
+
+
+def compare(request: Request, scenes: Sequence[tracer.Scene], progress: Progress) -> list[Outcome]:
+    """All outcomes of a run. Raises `UsageError` for an unknown term, `MachineError` for a backend that the
+    machine lacks."""
+    return run(
+        scenes,
+        request.find_terms(),
+        request.precisions,
+        request.rays_a_scene,
+        progress,
+        request.processor,
+        request.seed,
+    )
+
+
+def validation_of(request: Request, outcomes: Sequence[Outcome], notes: Sequence[str] = ()) -> Validation:
+    """The outcomes with the head of a report, and with notes on what was left out."""
+    header = header_of(
+        request.command, request.precisions, request.processor, request.rays_a_scene, request.seed
+    )
+    return Validation(header, tuple(outcomes), (*notes, *left_out(request)))
+
+
+def left_out(request: Request) -> list[str]:
+    """What this run did not compare, and why."""
+    notes = []
+    if not has_cuda():
+        notes.append("CUDA against LLVM was not compared: there is no NVIDIA GPU here.")
+    if request.terms:
+        notes.append(f"Only these terms were asked for: {', '.join(request.terms)}.")
+    if not request.full:
+        notes.append("This is not the full run; `tracer validate --full` compares every built-in scene.")
+    return notes
