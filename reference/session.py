@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import tracer
 from reference.comparison import Outcome, Progress, Term, Validation, all_terms, find_terms, run
-from reference.comparison.selection import FULL_RAYS, STANDARD_RAYS, chosen_scenes
+from reference.comparison.selection import FULL_RAYS, STANDARD_RAYS, Subject, chosen_scenes
 from reference.report import (
     header_of,
     headline_place,
@@ -43,13 +44,18 @@ class Request:
     allow_outside: bool
     command: str
 
-    def load_scenes(self) -> list[tracer.Scene]:
-        """The scenes; raises `SceneError`."""
+    def subjects(self) -> list[Subject]:
+        """The scenes, and how a command names them; raises `SceneError`."""
 
         def load_one(name: str) -> tracer.Scene:
             return load(name, allow_outside=self.allow_outside, overrides=self.overrides)
 
-        return chosen_scenes(self.scenes, self.full, self.random, self.seed, load_one)
+        options = [f"--set {shlex.quote(override)}" for override in self.overrides]
+        options += ["--allow-outside"] if self.allow_outside else []
+        return [
+            replace(subject, words=" ".join([subject.words, *options]))
+            for subject in chosen_scenes(self.scenes, self.full, self.random, self.seed, load_one)
+        ]
 
     def find_terms(self) -> list[Term]:
         """The terms; raises `UsageError` for one that does not exist."""
@@ -116,11 +122,11 @@ class Files:
         return page
 
 
-def compare(request: Request, scenes: Sequence[tracer.Scene], progress: Progress) -> list[Outcome]:
+def compare(request: Request, subjects: Sequence[Subject], progress: Progress) -> list[Outcome]:
     """All outcomes of a run. Raises `UsageError` for an unknown term, `MachineError` for a backend that the
     machine lacks."""
     return run(
-        scenes,
+        subjects,
         request.find_terms(),
         request.precisions,
         request.rays_a_scene,

@@ -23,7 +23,8 @@ EDGE_ON = 1e-4
 class Bends:
     """The mirrors or refractions of all chains: the step of each, the normal (n, 3) that faces the ray and
     closed forms of the direction after it (NaN after total reflection), at the exact normal of our vertex;
-    `k` = 1 - eta^2 (1 - c^2), `eta` and `curve` = S / r."""
+    `k` = 1 - eta^2 (1 - c^2), `eta` and `curve` = S / r; `sure`: away from edges, rims and interpolated
+    normals seen edge on."""
 
     steps: Steps
     normal: Array
@@ -32,6 +33,7 @@ class Bends:
     eta: Array
     entering: Array
     curve: Array
+    sure: Array
 
     def part(self, k: Array) -> Bends:
         """Some of them, by number or mask."""
@@ -55,10 +57,9 @@ def bends(case: Case, refracts: bool) -> Bends:
 
 
 def _bends(case: Case, refracts: bool) -> Bends:
-    truth, s = case.bench.truth, agreed_steps(case)
-    s = s.part(s.refracts == refracts)
-    if refracts:
-        s = s.part(truth.ior[s.shape] != 1)
+    truth, (s, sure) = case.bench.truth, agreed_steps(case)
+    wanted = (s.refracts == refracts) & (~s.refracts | (truth.ior[s.shape] != 1))
+    s, sure = s.part(wanted), sure[wanted]
     d = extended.unit(s.d)
     normal, entering, cosine = truth.shading(s.p, d, s.shape, s.primitive)
     ior = extended.number(truth.ior[s.shape])
@@ -69,7 +70,7 @@ def _bends(case: Case, refracts: bool) -> Bends:
         exact, k = extended.mirror(d, normal), extended.number(np.ones(len(cosine)))
     curve = sizes(truth, s.o, s.p) / bend_radius(truth, s.shape, s.primitive)
     columns = (extended.double(normal), extended.double(exact), extended.double(k), extended.double(eta))
-    return Bends(s, *columns, entering, curve).part(cosine > EDGE_ON)
+    return Bends(s, *columns, entering, curve, sure & (cosine > EDGE_ON))
 
 
 def bend_radius(truth: Truth, shape: Array, primitive: Array) -> Array:

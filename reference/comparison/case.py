@@ -63,13 +63,15 @@ class Bench:
 
 @dataclass
 class Case:
-    """A scene to compare in. `rays`: about how many; `backend`: ours (Mitsuba runs on LLVM)."""
+    """A scene to compare in. `rays`: about how many; `backend`: ours (Mitsuba runs on LLVM); `words`: how a
+    command line names the scene."""
 
     scene: tracer.Scene
     precision: str = "double"
     backend: str = "llvm"
     rays: int = 20_000
     seed: int = 0
+    words: str = ""
     bench: Bench = field(init=False, repr=False)
     memory: dict[str, Any] = field(init=False, repr=False, default_factory=dict)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from reference.comparison import grazing
 from reference.comparison.case import HORIZON, Case, sizes
-from reference.comparison.judge import SINGLE, Sides, replay, samples
+from reference.comparison.judge import SINGLE, Sides, replay, samples, share_of
 from reference.comparison.rays import RaySet
 from reference.comparison.records import Guilty, Outcome
 from reference.tolerances import TOLERANCES
@@ -64,18 +64,13 @@ def judge_decisions(case: Case, term: str, decisions: Decisions) -> Outcome:
         allowed=0.0,
         unit="rays",
         excluded=int(inside.sum()),
-        excluded_allowed=grazing_allowed(len(rays)),
+        excluded_allowed=share_of("grazing rays", len(rays)),
         guilty=_guilty(*decisions.wrong(outside[:JUDGED])) if len(outside) else "",
         worst=differing[0] if differing else None,
         samples=decisions.differ[kept].astype(np.float64),
         distance_to_silhouette=silhouette,
         differing=differing,
     )
-
-
-def grazing_allowed(rays: int) -> int:
-    """How many of so many rays may differ in the grazing band."""
-    return int(np.ceil(TOLERANCES["grazing rays"].value * rays))
 
 
 def _guilty(ours: Array, mitsuba: Array) -> Guilty:
@@ -142,9 +137,11 @@ def judge_ids(
 
 def hit_distance(case: Case, rays: RaySet, k: Array, ours: Answers, mitsuba: Answers, reach: Array) -> Array:
     """(n,) lengths by which some rays (by number) are off a silhouette, an edge, a tie of the two primitives
-    that are named, or 0 at the horizon of a plane. `reach` (all rays): distance of the farther hit."""
+    that are named, or start off a surface; 0 at the horizon of a plane. `reach` (all rays): distance of the
+    farther hit."""
     truth, o, d = case.bench.truth, rays.o[k], rays.d[k]
     distance = grazing.silhouette_distance(truth, o, d, reach[k])
+    distance = np.minimum(distance, grazing.start_distance(truth, o))
     both = (ours.shape[k] >= 0) & (mitsuba.shape[k] >= 0)
     i = k[both]
     a, b = (np.stack([side.shape[i], side.primitive[i]], axis=1) for side in (ours, mitsuba))

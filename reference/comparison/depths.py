@@ -72,6 +72,7 @@ def compare_depth(case: Case) -> Outcome:
     extent = sizes(truth, b.rays.o[k], b.rays.o[k] + t[:, None] * b.rays.d[k])
     # Both sides make rays of their own, so their rims lie farther apart than those of one ray.
     clear = rim_clearance(radius, cosine) > 2 * TOLERANCES["grazing band"].value * SINGLE * extent
+    left_out = int((~clear).sum())
     k, t, cosine, condition, extent = (a[clear] for a in (k, t, cosine, condition, extent))
     unit = extent / cosine
     # Mitsuba's rays come from the eye, so its place counts among the coordinates.
@@ -86,6 +87,7 @@ def compare_depth(case: Case) -> Outcome:
         unit="eps S / cos",
         answers=lambda i: (f"depth {b.ours[k[i]]!s}", f"depth {b.theirs[k[i]]!s}", f"depth {t[i]!s}"),
         ulp=(case.ulps(b.ours[k] - t, t), case.bench.ulps(b.theirs[k] - t, t)),
+        left_out=left_out,
     )
     return judge_numbers(case, "depth buffer", numbers, bounds(case, "depth buffer", "mitsuba depth buffer"))
 

@@ -16,39 +16,34 @@ from reference.tolerances import TOLERANCES
 Array = np.ndarray
 
 
-def of_kind(case: Case, b: Bends, kind: str) -> Bends:
-    """The events on shapes of a kind."""
-    return b.part(case.bench.truth.kind[b.steps.shape] == kind)
+def of_kind(case: Case, b: Bends, kind: str) -> tuple[Bends, int]:
+    """The events on shapes of a kind that are sure, and how many there are in all."""
+    b = b.part(case.bench.truth.kind[b.steps.shape] == kind)
+    return b.part(b.sure), len(b.sure)
 
 
 def compare_mirror(case: Case, kind: str) -> Outcome:
     """Directions after a mirror, in eps (1 + 2 S / r); Mitsuba's at the same, rounded, normal: in eps."""
-    b = of_kind(case, bends(case, refracts=False), kind)
-    b = b.part(gone_on(b))
+    b, met = of_kind(case, bends(case, refracts=False), kind)
     d, n, _ = b.asked()
     theirs, asked = optics.mirrored(d, n), extended.mirror(extended.unit(d), extended.unit(n))
     unit = 1 + 2 * b.curve
-    return _judge(case, f"mirror, {kind}", "mirror", b, theirs, asked, unit, np.ones(len(unit)))
+    return _judge(case, f"mirror, {kind}", "mirror", b, theirs, asked, unit, np.ones(len(unit)), met)
 
 
 def compare_refraction(case: Case, kind: str) -> Outcome:
     """Directions after refraction in units of their conditioning, see the table of tolerances; where
     reflection is not total, nor nearly."""
-    b = of_kind(case, bends(case, refracts=True), kind)
-    b = b.part((b.k > total_band(b, SINGLE)) & gone_on(b))
+    b, met = of_kind(case, bends(case, refracts=True), kind)
+    total = b.k <= total_band(b, SINGLE)
+    b, met = b.part(~total), met - int((b.k < 0).sum())
     d, n, outward = b.asked()
-    theirs, total = optics.refracted(d, outward, case.bench.truth.ior[b.steps.shape])
-    b, d, n, theirs = b.part(~total), d[~total], n[~total], theirs[~total]
+    theirs, _ = optics.refracted(d, outward, case.bench.truth.ior[b.steps.shape])
     asked = extended.refract(extended.unit(d), extended.unit(n), extended.number(b.eta))[0]
     root, c = np.sqrt(b.k), np.abs((b.normal * b.steps.d).sum(axis=1))
     same_normal = 1 + (b.eta + b.eta**2) / root
     unit = same_normal + b.curve * np.abs(b.eta * c - root) * (1 + b.eta / root)
-    return _judge(case, f"refraction, {kind}", "refraction", b, theirs, asked, unit, same_normal)
-
-
-def gone_on(b: Bends) -> Array:
-    """Mask: our chain left the vertex."""
-    return np.asarray(np.isfinite(b.steps.out).all(axis=1))
+    return _judge(case, f"refraction, {kind}", "refraction", b, theirs, asked, unit, same_normal, met)
 
 
 def _judge(
@@ -60,8 +55,10 @@ def _judge(
     asked: extended.Extended,
     unit: Array,
     same_normal: Array,
+    met: int,
 ) -> Outcome:
-    """Both sides against their own closed form; `unit`, `same_normal`: conditioning of ours and of theirs."""
+    """Both sides against their own closed form; `unit`, `same_normal`: conditioning of ours and of theirs;
+    `met`: events in all, those left out among them."""
     ours_error, theirs_error = b.steps.out - b.exact, theirs - extended.double(asked)
     difference, ours, mitsuba = (
         np.abs(e).max(axis=1, initial=0) for e in (ours_error - theirs_error, ours_error, theirs_error)
@@ -79,6 +76,7 @@ def _judge(
             f"along {b.exact[i]}",
         ),
         ulp=(case.ulps(ours), case.bench.ulps(mitsuba)),
+        left_out=met - len(ours),
     )
     return judge_numbers(case, term, numbers, bounds(case, name, "mitsuba direction"))
 

@@ -35,7 +35,8 @@ def farther(a: Array, b: Array) -> Array:
 @dataclass(frozen=True)
 class Agreed:
     """The rays of a case that hit the same primitive of one kind and do not graze it: their numbers `k`, the
-    closed forms `t`, `normal`, |cosine| of arrival, S, `radius` and `condition` (see `roundness`)."""
+    closed forms `t`, `normal`, |cosine| of arrival, S, `radius` and `condition` (see `roundness`), unit `d`;
+    `left_out`: how many graze the rim of a sphere."""
 
     k: Array
     t: Array
@@ -45,6 +46,7 @@ class Agreed:
     radius: Array
     condition: Array
     d: Array
+    left_out: int
 
 
 def agreed(case: Case, kind: str) -> Agreed:
@@ -64,9 +66,12 @@ def _agreed(case: Case, kind: str) -> Agreed:
     d = rays.d[k] / np.linalg.norm(rays.d[k], axis=1, keepdims=True)
     cosine = np.abs((normal * d).sum(axis=1))
     radius, condition = roundness(truth, ours.shape[k], ours.primitive[k])
-    table = Agreed(k, t, normal, cosine, case.extents[k], radius, condition, d)
-    clear = rim_clearance(radius, cosine) > TOLERANCES["grazing band"].value * SINGLE * table.extent
-    return Agreed(*(column[clear] for column in vars(table).values()))
+    extent = case.extents[k]
+    clear = rim_clearance(radius, cosine) > TOLERANCES["grazing band"].value * SINGLE * extent
+    k, t, normal, cosine, extent, radius, condition, d = (
+        column[clear] for column in (k, t, normal, cosine, extent, radius, condition, d)
+    )
+    return Agreed(k, t, normal, cosine, extent, radius, condition, d, left_out=int((~clear).sum()))
 
 
 def rim_clearance(radius: Array, cosine: Array) -> Array:
@@ -91,6 +96,7 @@ def compare_distance(case: Case, kind: str) -> Outcome:
         unit="eps S / cos",
         answers=lambda i: (f"t = {ours_t[i]!s}", f"t = {theirs_t[i]!s}", f"t = {at.t[i]!s}"),
         ulp=(case.ulps(ours_t - at.t, at.t), case.bench.ulps(theirs_t - at.t, at.t)),
+        left_out=at.left_out,
     )
     return judge_numbers(case, f"distance, {kind}", numbers, bounds(case, "distance", f"mitsuba {kind}"))
 
@@ -115,6 +121,7 @@ def compare_normal(case: Case, kind: str) -> Outcome:
         unit="eps S / (r cos)",
         answers=lambda i: (f"normal {ours[i]}", f"normal {theirs[i]}", f"normal {at.normal[i]}"),
         ulp=(case.ulps(own), case.bench.ulps(other)),
+        left_out=at.left_out,
     )
     return judge_numbers(case, f"normal, {kind}", numbers, bounds(case, "normal", "mitsuba normal"))
 
@@ -136,6 +143,7 @@ def compare_position(case: Case, kind: str) -> Outcome:
             f"position {p}" for p in (case.ours.position[at.k[i]], theirs.p[at.k[i]], exact[i])
         ),
         ulp=(case.ulps(ours, unit), case.bench.ulps(other, unit)),
+        left_out=at.left_out,
     )
     return judge_numbers(case, f"position, {kind}", numbers, bounds(case, "position", f"mitsuba {kind}"))
 

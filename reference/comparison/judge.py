@@ -51,6 +51,7 @@ class Numbers:
     unit: str
     answers: Callable[[int], Sides]
     ulp: tuple[Array, Array] | None = None
+    left_out: int = 0
 
 
 def bounds(case: Case, ours: str, mitsuba: str) -> Bounds:
@@ -79,6 +80,8 @@ def judge_numbers(case: Case, term: str, numbers: Numbers, allowed: Bounds) -> O
         measured=measured,
         allowed=allowed.difference,
         unit=numbers.unit,
+        excluded=numbers.left_out,
+        excluded_allowed=share_of("left out", len(difference) + numbers.left_out),
         ours_error=our_error,
         ours_allowed=allowed.ours,
         mitsuba_error=their_error,
@@ -91,6 +94,11 @@ def judge_numbers(case: Case, term: str, numbers: Numbers, allowed: Bounds) -> O
         distance_to_silhouette=distance,
         spectrum=None if numbers.ulp is None else Spectrum.of(*numbers.ulp),
     )
+
+
+def share_of(name: str, rays: int) -> int:
+    """How many of so many rays a row of the table of tolerances allows."""
+    return int(np.ceil(TOLERANCES[name].value * rays))
 
 
 def guilty_side(ours: float, mitsuba: float) -> Guilty:
@@ -116,14 +124,12 @@ def samples(case: Case, rays: RaySet, index: Array, worst: int | None) -> tuple[
 
 def replay(case: Case, rays: RaySet, k: int, answers: Sides, in_band: bool = False) -> Replay:
     """The ray as a record, with the command that shows it again."""
-    name = case.scene.name
-    where = f"--random 1 --seed {name.removeprefix('random-')}" if name.startswith("random-") else name
     column, row = (int(x) for x in rays.pixel[k])
     return Replay(
         rays.o[k].tolist(),
         rays.d[k].tolist(),
         *answers,
-        command=f"tracer validate {where} {rays.options(k)}",
+        command=f"tracer validate {case.words or case.scene.name} {rays.options(k)}",
         pixel=(column, row) if column >= 0 else None,
         in_band=in_band,
     )

@@ -48,8 +48,9 @@ def compare_next_hit(case: Case) -> Outcome:
 
 def compare_next_vertex(case: Case, kind: str) -> Outcome:
     """|dt cos| of the steps from the second vertex on, in eps S."""
-    truth, s = case.bench.truth, agreed_steps(case)
-    s = s.part((s.vertex > 0) & (truth.kind[s.shape] == kind))
+    truth, (s, sure) = case.bench.truth, agreed_steps(case)
+    wanted = (s.vertex > 0) & (truth.kind[s.shape] == kind)
+    s, sure = s.part(wanted), sure[wanted]
     way, rounded = extended.unit(s.d), extended.unit(s.way)
     t, normal = (extended.double(x) for x in truth.hit(s.o, way, s.shape, s.primitive, s.left))
     their_t, their_normal = (
@@ -59,10 +60,9 @@ def compare_next_vertex(case: Case, kind: str) -> Outcome:
     cosine, their_cosine = np.abs((normal * way).sum(axis=1)), np.abs((their_normal * rounded).sum(axis=1))
     radius, condition = roundness(truth, s.shape, s.primitive)
     extent = sizes(truth, s.o, s.p)
-    clear = rim_clearance(radius, np.minimum(cosine, their_cosine))
-    k = np.flatnonzero(
-        (clear > TOLERANCES["grazing band"].value * SINGLE * extent) & ~is_near(case, s, s.p, s.o)
-    )
+    their_clear = rim_clearance(radius, their_cosine)
+    sure &= their_clear > TOLERANCES["grazing band"].value * SINGLE * extent
+    k = np.flatnonzero(sure & ~is_near(case, s, s.p, s.o))
     ours = (((s.p - s.o) * way).sum(axis=1) - t)[k]
     theirs = (((s.theirs_p - s.origin) * rounded).sum(axis=1) - their_t)[k]
     across, their_across = ours * (cosine / extent)[k], theirs * (their_cosine / extent)[k]
@@ -79,6 +79,7 @@ def compare_next_vertex(case: Case, kind: str) -> Outcome:
             f"t = {t[k[i]]!s} from {s.o[k[i]].tolist()} along {s.d[k[i]].tolist()}",
         ),
         ulp=(case.ulps(ours, t[k]), case.bench.ulps(theirs, their_t[k])),
+        left_out=len(s) - len(k),
     )
     allowed = bounds(case, "next vertex", "mitsuba next vertex")
     return judge_numbers(case, f"lockstep, next vertex, {kind}", numbers, allowed)

@@ -89,7 +89,8 @@ class Panels:
 class Outcome:
     """One term on one scene in one precision.
 
-    `rays` compared; `excluded`: rays that differ in the grazing band, at most `excluded_allowed`; `measured`,
+    `rays` compared; `excluded`: rays that differ in the grazing band (for numbers: rays left out since they
+    graze what they hit), at most `excluded_allowed`; `measured`,
     `allowed`: the largest difference between the two tracers in `unit` (for ids and masks: how many differ
     outside the band); `ours_error`, `mitsuba_error`: against extended precision, each in units of its own
     precision, with their bounds, NaN where there is no closed form; `guilty`: who broke a bound; `samples`:
@@ -155,9 +156,9 @@ class Outcome:
     def __str__(self) -> str:
         text = (
             f"{self.term}, {self.scene}, {self.precision}: {self.verdict}; measured {self.measured:.3g}, "
-            f"allowed {self.allowed:.3g} {self.unit}; {self.rays} rays, {self.excluded} differ in the "
-            f"grazing band (allowed {self.excluded_allowed}); errors: ours {self.ours_error:.3g} (allowed "
-            f"{self.ours_allowed:.3g}), Mitsuba {self.mitsuba_error:.3g} (allowed {self.mitsuba_allowed:.3g})"
+            f"allowed {self.allowed:.3g} {self.unit}; {self.rays} rays, {self.excluded} left to "
+            f"the grazing band (allowed {self.excluded_allowed}); errors: ours {self.ours_error:.3g} "
+            f"(allowed {self.ours_allowed:.3g}), Mitsuba {self.mitsuba_error:.3g} (allowed {self.mitsuba_allowed:.3g})"
         )
         guilty = f"; guilty: {self.guilty}" if self.guilty else ""
         return f"{text}{guilty}" + (f"; {self.worst}" if self.worst else "")
@@ -173,6 +174,10 @@ class Term:
     applies: Callable[[tracer.Scene], bool]
     run: Callable[[Case], Outcome]
     precisions: tuple[str, ...] = ("single", "double")
+
+    def suits(self, scene: tracer.Scene, precision: str) -> bool:
+        """Whether there is something to compare."""
+        return precision in self.precisions and self.applies(scene)
 
 
 @dataclass(frozen=True)

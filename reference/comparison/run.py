@@ -20,6 +20,7 @@ from reference.comparison import (
 )
 from reference.comparison.case import Case
 from reference.comparison.records import Outcome, Term
+from reference.comparison.selection import Subject
 from tracer.errors import UsageError
 
 Progress = Callable[[int, int, Outcome], None]
@@ -43,7 +44,7 @@ def find_terms(names: Sequence[str]) -> list[Term]:
 
 
 def run(
-    scenes: Sequence[tracer.Scene],
+    scenes: Sequence[tracer.Scene | Subject],
     terms: Sequence[Term],
     precisions: Sequence[str] = ("single", "double"),
     rays: int = 20_000,
@@ -51,21 +52,23 @@ def run(
     backend: str = "llvm",
     seed: int = 0,
 ) -> list[Outcome]:
-    """The outcomes of the terms that apply, scene by scene and precision by precision.
+    """The outcomes of the terms that apply, scene by scene and precision by precision. A `Subject` says how a
+    replay names its scene, else the scene's name does.
 
     Raises `MachineError` without Mitsuba, `SceneError` for a scene that cannot be compiled.
     """
+    subjects = [scene if isinstance(scene, Subject) else Subject(scene, scene.name) for scene in scenes]
     work = [
-        (scene, precision, [term for term in terms if precision in term.precisions and term.applies(scene)])
-        for scene in scenes
+        (subject, precision, [term for term in terms if term.suits(subject.scene, precision)])
+        for subject in subjects
         for precision in precisions
     ]
     total = sum(len(applicable) for *_, applicable in work)
     outcomes: list[Outcome] = []
     case: Case | None = None
-    for scene, precision, applicable in work:
-        if case is None or case.scene is not scene:
-            case = Case(scene, backend=backend, rays=rays, seed=seed)
+    for subject, precision, applicable in work:
+        if case is None or case.scene is not subject.scene:
+            case = Case(subject.scene, backend=backend, rays=rays, seed=seed, words=subject.words)
         case = case.in_precision(precision)
         for term in applicable:
             outcomes.append(term.run(case))

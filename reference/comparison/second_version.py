@@ -15,7 +15,7 @@ from reference import plain
 from reference.comparison.canvas_moves import canvas_changes
 from reference.comparison.case import Case, small_picture
 from reference.comparison.decisions import LISTED
-from reference.comparison.judge import replay
+from reference.comparison.judge import replay, share_of
 from reference.comparison.kinds import has_shapes
 from reference.comparison.records import Outcome, Replay, Term
 from reference.comparison.renders import pixel_centers
@@ -89,7 +89,7 @@ def compare_colors(case: Case) -> Outcome:
     outside = order[~excused.ravel()[order]]
 
     def at(k: int) -> Replay:
-        own, other = (f"color {c.reshape(-1, 3)[k]}" for c in (v.ours.color, v.theirs.color))
+        own, other = (f"color {c.reshape(-1, 3)[k].tolist()}" for c in (v.ours.color, v.theirs.color))
         return replay(case, rays, k, (own, "not asked", f"(plain) {other}"), bool(excused.flat[k]))
 
     return Outcome(
@@ -102,7 +102,7 @@ def compare_colors(case: Case) -> Outcome:
         allowed=row.value,
         unit="display value",
         excluded=int(excused.sum()),
-        excluded_allowed=int(np.ceil(TOLERANCES["edge pixels"].value * apart.size)),
+        excluded_allowed=share_of("edge pixels", apart.size),
         guilty="ours" if len(outside) else "",
         worst=at(int(outside[0] if len(outside) else np.argmax(apart))),
         differing=tuple(at(int(k)) for k in order[:LISTED]),

@@ -14,8 +14,9 @@ import numpy as np
 import tracer
 from reference.comparison import grazing
 from reference.comparison.case import Case, sizes
+from reference.comparison.hits import rim_clearance
 from reference.comparison.rays import RaySet, StepRays, single
-from reference.comparison.truth import MESH
+from reference.comparison.truth import MESH, SPHERE, Truth
 from reference.tolerances import EPSILON, TOLERANCES
 
 Array = np.ndarray
@@ -152,14 +153,27 @@ def parted(case: Case, s: Steps) -> Array:
     return np.asarray(again & (s.shape == s.theirs_shape) & ~is_near(case, s, s.p, s.o))
 
 
-def agreed_steps(case: Case) -> Steps:
-    """The steps that reach the same primitive at the same place, away from the edges of triangles, where the
-    normal is in doubt."""
-    truth, s = case.bench.truth, steps(case)
-    same = (s.shape == s.theirs_shape) & (s.primitive == s.theirs_primitive)
-    s = s.part((s.shape >= 0) & same & ~parted(case, s))
-    sure = np.ones(len(s), bool)
+def agreed_steps(case: Case) -> tuple[Steps, Array]:
+    """The steps that reach the same primitive at the same place, and a mask of those away from the edges of
+    triangles and the rims of spheres, where normal and side are in doubt. Made once a case."""
+    if "agreed" not in case.memory:
+        truth, s = case.bench.truth, steps(case)
+        same = (s.shape == s.theirs_shape) & (s.primitive == s.theirs_primitive)
+        s = s.part((s.shape >= 0) & same & ~parted(case, s))
+        band = TOLERANCES["grazing band"].value * EPSILON["single"] * sizes(truth, s.o, s.p)
+        case.memory["agreed"] = s, clearance(truth, s) > band
+    found: tuple[Steps, Array] = case.memory["agreed"]
+    return found
+
+
+def clearance(truth: Truth, s: Steps) -> Array:
+    """(n,) by how much the steps of a chain miss the edges of the triangle or the rim of the sphere that they
+    reach."""
+    clear = np.full(len(s), np.inf)
     k = np.flatnonzero(truth.kind[s.shape] == MESH)
-    inner = grazing.inner_distance(s.p[k], truth.triangles(s.shape[k], s.primitive[k]))
-    sure[k] = inner > TOLERANCES["grazing band"].value * EPSILON["single"] * sizes(truth, s.o[k], s.p[k])
-    return s.part(sure)
+    clear[k] = grazing.inner_distance(s.p[k], truth.triangles(s.shape[k], s.primitive[k]))
+    k = np.flatnonzero(truth.kind[s.shape] == SPHERE)
+    radius = truth.rows[s.shape[k], 3]
+    cosine = np.abs(((s.p[k] - truth.rows[s.shape[k], :3]) * s.d[k]).sum(axis=1)) / radius
+    clear[k] = rim_clearance(radius, cosine)
+    return clear

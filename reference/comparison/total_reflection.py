@@ -16,6 +16,7 @@ from reference.comparison.records import Outcome, Term
 def compare_total_reflection(case: Case) -> Outcome:
     """Which refractions are total: ours, Mitsuba's and the sign of k."""
     b = bends(case, refracts=True)
+    b = b.part(b.sure)
     d, _, outward = b.asked()
     _, theirs = optics.refracted(d, outward, case.bench.truth.ior[b.steps.shape])
     ours, exact = np.isnan(b.steps.out).any(axis=1), b.k < 0

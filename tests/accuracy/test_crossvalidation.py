@@ -14,6 +14,7 @@ from reference import extended
 from reference.comparison import Case, Outcome, all_terms, find_terms, run
 from reference.comparison.grazing import silhouette_distance, tie_distance
 from reference.comparison.rays import pixel_rays
+from reference.comparison.selection import random_subject
 from reference.comparison.truth import Truth
 from reference.random_scenes import random_scene
 from tests.accuracy.probe import directions
@@ -46,7 +47,7 @@ def case_of(name: str, precision: str, rays: int) -> Case:
 def check(name: str, term: str, precision: str, rays: int) -> None:
     (wanted,) = find_terms([term])
     case = case_of(name, precision, rays)
-    if not wanted.applies(case.scene) or precision not in wanted.precisions:
+    if not wanted.suits(case.scene, precision):
         pytest.skip("there is nothing to compare")
     outcome = wanted.run(case)
     assert outcome.passed, str(outcome)
@@ -69,7 +70,7 @@ def test_agrees_on_every_scene(name: str) -> None:
 def test_an_outcome_is_json_and_names_a_ray() -> None:
     seen = []
     outcomes = run(
-        [random_scene(3)],
+        [random_subject(3)],
         find_terms(["hits", "distance, sphere", "chain growth"]),
         ("double",),
         2_000,

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -118,7 +119,7 @@ def test_a_broken_tolerance_is_told_and_ends_with_1(validate: Run, tmp_path: Pat
     assert done.returncode == 1, done.stdout + done.stderr
     failed, verdict, files = done.stdout.splitlines()
     assert failed.startswith("failed: distance, sphere, small, double: failed; measured ")
-    assert "guilty: ours" in failed and "replay: tracer validate small --" in failed
+    assert "guilty: ours" in failed and "replay: tracer validate small.toml --" in failed
     assert verdict.startswith("1 of 1 failed") and "crossvalidation" in files
     assert "failed" in (tmp_path / "reports" / "crossvalidation" / "index.html").read_text()
 
@@ -144,6 +145,22 @@ def test_a_pixel_is_shown_vertex_by_vertex(validate: Run, tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
+def test_the_command_of_a_ray_shows_what_the_outcome_says(validate: Run, tmp_path: Path) -> None:
+    options = ("--set", "shapes.ball.radius=0.9", "--rays", "1000", "--term", "distance, sphere")
+    assert validate("small.toml", *options, "--json", "all.json").returncode == 0
+    (single, double) = json.loads((tmp_path / "all.json").read_text())["outcomes"]
+    assert (single["precision"], double["precision"]) == ("single", "double")
+    worst = double["worst"]
+    words = shlex.split(worst["command"])
+    assert words[:5] == ["tracer", "validate", "small.toml", "--set", "shapes.ball.radius=0.9"]
+    shown = validate(*words[2:])
+    assert shown.returncode == 0, shown.stderr
+    (line,) = [line for line in shown.stdout.splitlines() if "distance" in line][:1]
+    ours = float(worst["ours"].removeprefix("t = "))
+    assert float(line.split()[1]) == pytest.approx(ours, rel=1e-14)
+
+
+@pytest.mark.slow
 def test_random_scenes_need_no_file(validate: Run) -> None:
     done = validate("--random", "1", "--seed", "5", "--rays", "500", "--term", "hits", "--out", "r")
     assert done.returncode == 0, done.stderr
@@ -158,6 +175,7 @@ def test_random_scenes_need_no_file(validate: Run) -> None:
         (["nothing.toml"], "nothing.toml"),
         (["small.toml", "--term", "hit"], "term: 'hit' is unknown; allowed are camera rays, "),
         (["small.toml", "--rays", "5"], "100"),
+        (["room", "room"], "room: another scene is called 'room' as well"),
         (
             ["small.toml", "--pixel", "64", "0"],
             "--pixel: 64 0 is outside the picture; allowed are columns 0 to 63",

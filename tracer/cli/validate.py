@@ -138,7 +138,7 @@ def compare(request: Request, interruption: Interruption, **options: Any) -> int
     interruption.quiet = quiet = options["quiet"]
     files = session.Files(options["out"], options["json_file"], options["summary"], options["headline"])
     request.find_terms()
-    scenes, _ = request.load_scenes(), request.processor
+    subjects, _ = request.subjects(), request.processor
     files.check()
     reporter = make_reporter("none" if quiet and options["progress"] == "auto" else options["progress"], "")
     done: list[Outcome] = []
@@ -152,7 +152,7 @@ def compare(request: Request, interruption: Interruption, **options: Any) -> int
 
     try:
         with thread_count(options["threads"]), interruption.deferred():
-            session.compare(request, scenes, progress)
+            session.compare(request, subjects, progress)
     except KeyboardInterrupt:
         page = files.write_partial(session.validation_of(request, done, stopped))
         talk(f"{interruption.reason}: {page} holds what was finished")
@@ -193,10 +193,10 @@ def show_ray(
     wrong = sorted(set(events or "") - {"R", "T"})
     if wrong:
         raise UsageError(f"--events: {events!r} contains {wrong[0]!r}; allowed are the letters R and T")
-    scenes = request.load_scenes() if request.scenes or request.random else []
-    if len(scenes) != 1:
-        raise UsageError(f"--pixel and --ray show a ray of one scene; {len(scenes)} are named")
-    case = Case(scenes[0], backend=request.processor, seed=request.seed)
+    subjects = request.subjects() if request.scenes or request.random else []
+    if len(subjects) != 1:
+        raise UsageError(f"--pixel and --ray show a ray of one scene; {len(subjects)} are named")
+    case = Case(subjects[0].scene, backend=request.processor, seed=request.seed)
     start = pixel_ray(case, *pixel) if pixel is not None else free_ray(ray or ())
     vertices = replay_ray(case, start, events)
     click.echo(replay_text(case.scene, vertices, start.o[0].tolist(), start.d[0].tolist()))
