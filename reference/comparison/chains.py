@@ -15,7 +15,7 @@ from reference.comparison.judge import SINGLE, guilty_side, replay, samples
 from reference.comparison.kinds import has_shapes
 from reference.comparison.rays import StepRays
 from reference.comparison.records import Growth, Outcome, Term
-from reference.comparison.steps import chains, refractions, step_length
+from reference.comparison.steps import chains, step_length
 from reference.tolerances import TOLERANCES
 
 Array = np.ndarray
@@ -40,8 +40,8 @@ def mitsuba_chains(case: Case) -> tuple[Array, Array, Array]:
     """Mitsuba's chains from vertex to vertex of its own: positions (n, k, 3), shapes and primitives (n, k),
     NaN and -1 where a chain has ended."""
     truth, rays = case.bench.truth, chains(case).rays
-    refracts = refractions(chains(case).events)
-    n, length = refracts.shape if len(refracts) else (0, 0)
+    refracts = chains(case).refracts
+    n, length = refracts.shape
     position, shape, primitive = np.full((n, length, 3), np.nan), *np.full((2, n, length), -1)
     o, d, going = rays.o, rays.d, np.arange(n)
     for vertex in range(length):
@@ -74,7 +74,7 @@ def exact_chains(case: Case, same: Array) -> Array:
     """(n, k, 3) vertices of the chains in extended precision, rounded to doubles, along the primitives that
     our chains reach, as far as `same` (n, k) says."""
     truth, (rays, path) = case.bench.truth, (chains(case).rays, chains(case).path)
-    refracts = refractions(chains(case).events)
+    refracts = chains(case).refracts
     position = np.full((*same.shape, 3), np.nan)
     k, o, d = np.arange(len(rays)), extended.number(rays.o), extended.unit(rays.d)
     left = np.full(len(k), -1)
@@ -143,7 +143,7 @@ def compare_growth(case: Case) -> Outcome:
         for vertex, there in enumerate(np.isfinite(between).T)
         if there.sum() >= ENOUGH
     )
-    rays = StepRays(ours.rays.o, ours.rays.d, ours.rays.pixel, ours.rays, np.array(ours.events))
+    rays = StepRays(ours.rays.o, ours.rays.d, ours.rays.pixel, ours.rays, ours.events)
     last = np.nan_to_num(between).max(axis=1, initial=0)
     kept, distance = samples(case, rays, np.arange(len(rays)), None)
     allowed = TOLERANCES["chain growth"].value

@@ -16,6 +16,7 @@ from reference.comparison.case import HORIZON, Case, sizes
 from reference.comparison.judge import SINGLE, Sides, replay, samples, share_of
 from reference.comparison.rays import RaySet
 from reference.comparison.records import Guilty, Outcome
+from reference.comparison.truth import MESH
 from reference.tolerances import TOLERANCES
 
 Array = np.ndarray
@@ -143,6 +144,7 @@ def hit_distance(case: Case, rays: RaySet, k: Array, ours: Answers, mitsuba: Ans
     distance = grazing.silhouette_distance(truth, o, d, reach[k])
     distance = np.minimum(distance, grazing.start_distance(truth, o))
     both = (ours.shape[k] >= 0) & (mitsuba.shape[k] >= 0)
+    both &= (ours.shape[k] != mitsuba.shape[k]) | (truth.kind[ours.shape[k]] == MESH)  # no tie with itself
     i = k[both]
     a, b = (np.stack([side.shape[i], side.primitive[i]], axis=1) for side in (ours, mitsuba))
     distance[both] = np.minimum(distance[both], grazing.tie_distance(truth, o[both], d[both], a, b))

@@ -158,7 +158,8 @@ class Outcome:
             f"{self.term}, {self.scene}, {self.precision}: {self.verdict}; measured {self.measured:.3g}, "
             f"allowed {self.allowed:.3g} {self.unit}; {self.rays} rays, {self.excluded} left to "
             f"the grazing band (allowed {self.excluded_allowed}); errors: ours {self.ours_error:.3g} "
-            f"(allowed {self.ours_allowed:.3g}), Mitsuba {self.mitsuba_error:.3g} (allowed {self.mitsuba_allowed:.3g})"
+            f"(allowed {self.ours_allowed:.3g}), Mitsuba {self.mitsuba_error:.3g} "
+            f"(allowed {self.mitsuba_allowed:.3g})"
         )
         guilty = f"; guilty: {self.guilty}" if self.guilty else ""
         return f"{text}{guilty}" + (f"; {self.worst}" if self.worst else "")

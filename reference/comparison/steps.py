@@ -36,10 +36,12 @@ NEAR = 6
 
 @dataclass(frozen=True)
 class Chains:
-    """The rays that become chains, the events of each, and how our chains went."""
+    """The rays that become chains, the `events` of each (n,) in letters and as masks `refracts` (n, k) of the
+    events T, and how our chains went."""
 
     rays: RaySet
-    events: list[str]
+    events: Array
+    refracts: Array
     path: tracer.Paths
 
 
@@ -89,18 +91,15 @@ def chains(case: Case) -> Chains:
     """Our chains through a part of the rays; made once a case."""
     if "chains" not in case.memory:
         rays = case.bench.rays.part(np.arange(0, len(case.bench.rays), CHAIN_SHARE))
-        events = [CHAINS[k % len(CHAINS)] for k in range(len(rays))]
+        kind = np.arange(len(rays)) % len(CHAINS)
+        events = np.array(CHAINS)[kind]
+        refracts = np.array([[event == "T" for event in row] for row in CHAINS])[kind]
         path = tracer.trace_path(
-            case.bench.scene, rays.o, rays.d, events, precision=case.precision, backend=case.backend
+            case.bench.scene, rays.o, rays.d, events.tolist(), precision=case.precision, backend=case.backend
         )
-        case.memory["chains"] = Chains(rays, events, path)
+        case.memory["chains"] = Chains(rays, events, refracts, path)
     found: Chains = case.memory["chains"]
     return found
-
-
-def refractions(events: list[str]) -> Array:
-    """(n, k) masks of the events T."""
-    return np.array([[event == "T" for event in row] for row in events], bool)
 
 
 def steps(case: Case) -> Steps:
@@ -112,10 +111,9 @@ def steps(case: Case) -> Steps:
 
 
 def _in_lockstep(case: Case, ours: Chains) -> Steps:
-    rays, path, refracts = ours.rays, ours.path, refractions(ours.events)
+    rays, path, refracts = ours.rays, ours.path, ours.refracts
     o, d, left = rays.o, rays.d, np.full(len(rays), -1)
     going = np.full(len(rays), True)
-    names = np.array(ours.events)
     blocks: list[list[Array]] = []
     for vertex in range(refracts.shape[1]):
         k = np.flatnonzero(going)
@@ -129,7 +127,7 @@ def _in_lockstep(case: Case, ours: Chains) -> Steps:
         blocks.append(
             [o[k], d[k], left[k], *at_vertex, refracts[k, vertex], out[k], origin, way]
             + [hits.p, hits.shape, hits.primitive, np.full(len(k), vertex)]
-            + [rays.o[k], rays.d[k], rays.pixel[k], names[k]]
+            + [rays.o[k], rays.d[k], rays.pixel[k], ours.events[k]]
         )
         going = going & (path.count > vertex) & np.isfinite(out).all(axis=1)
         o, d, left = path.position[:, vertex], out, path.shape[:, vertex]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 
@@ -11,7 +12,7 @@ import pytest
 
 import tracer
 from reference import extended
-from reference.comparison import Case, Outcome, all_terms, find_terms, run
+from reference.comparison import Case, Outcome, all_terms, backends, find_terms, run
 from reference.comparison.grazing import silhouette_distance, tie_distance
 from reference.comparison.rays import pixel_rays
 from reference.comparison.selection import random_subject
@@ -19,6 +20,7 @@ from reference.comparison.truth import Truth
 from reference.random_scenes import random_scene
 from tests.accuracy.probe import directions
 from tracer.assets import builtin_scenes
+from tracer.backends import has_cuda
 from tracer.errors import UsageError
 
 pytest.importorskip("mitsuba")
@@ -29,6 +31,7 @@ SLOW_RAYS = 10_000
 RANDOM_SCENES = 4
 TERMS = [term.name for term in all_terms()]
 PRECISIONS = ("single", "double")
+BACKENDS = ("llvm", pytest.param("cuda", marks=pytest.mark.skipif(not has_cuda(), reason="no GPU")))
 
 
 def scene_of(name: str) -> tracer.Scene:
@@ -37,34 +40,60 @@ def scene_of(name: str) -> tracer.Scene:
 
 
 @cache
-def case_of(name: str, precision: str, rays: int) -> Case:
+def case_of(name: str, precision: str, backend: str) -> Case:
     """The case of a scene; both precisions share its rays and Mitsuba's answers."""
     if precision != PRECISIONS[0]:
-        return case_of(name, PRECISIONS[0], rays).in_precision(precision)
-    return Case(scene_of(name), precision=precision, rays=rays)
+        return case_of(name, PRECISIONS[0], backend).in_precision(precision)
+    return Case(scene_of(name), precision=precision, backend=backend, rays=QUICK_RAYS)
 
 
-def check(name: str, term: str, precision: str, rays: int) -> None:
+def check(name: str, term: str, precision: str, backend: str) -> None:
     (wanted,) = find_terms([term])
-    case = case_of(name, precision, rays)
+    case = case_of(name, precision, backend)
     if not wanted.suits(case.scene, precision):
         pytest.skip("there is nothing to compare")
     outcome = wanted.run(case)
     assert outcome.passed, str(outcome)
 
 
+@pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("precision", PRECISIONS)
 @pytest.mark.parametrize("term", TERMS)
 @pytest.mark.parametrize("name", QUICK_SCENES)
-def test_agrees_with_mitsuba_and_extended_precision(name: str, term: str, precision: str) -> None:
-    check(name, term, precision, QUICK_RAYS)
+def test_agrees_with_mitsuba_and_extended_precision(
+    name: str, term: str, precision: str, backend: str
+) -> None:
+    check(name, term, precision, backend)
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("name", [*builtin_scenes(), *(f"random-{k}" for k in range(RANDOM_SCENES))])
-def test_agrees_on_every_scene(name: str) -> None:
-    outcomes = run([scene_of(name)], all_terms(), PRECISIONS, SLOW_RAYS)
+def test_agrees_on_every_scene(name: str, backend: str) -> None:
+    outcomes = run([scene_of(name)], all_terms(), PRECISIONS, SLOW_RAYS, backend=backend)
     assert not [str(outcome) for outcome in outcomes if not outcome.passed]
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_two_backends_are_compared_like_two_tracers(precision: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What compares CUDA with LLVM, tried where there is no GPU: a backend agrees with itself; an error that
+    is planted in one of the two is found, and is that one's."""
+    case = Case(scene_of("room"), precision=precision, rays=2_000)
+    for compare in (backends.compare_hits, backends.compare_distances):
+        same = compare(case, "llvm", "llvm")
+        assert same.passed and same.measured == 0 and same.backend == "llvm and llvm"
+    true = backends.hits_on
+
+    def off(case: Case, backend: str) -> tracer.Hits:
+        hits = true(case, "llvm")
+        if backend == "llvm":
+            return hits
+        return replace(hits, t=hits.t * (1 + 1e-4), primitive=hits.primitive + (hits.shape == 2))
+
+    monkeypatch.setattr(backends, "hits_on", off)
+    hits, distances = backends.compare_hits(case), backends.compare_distances(case)
+    assert (hits.passed, hits.guilty, hits.measured > 0) == (False, "cuda", True)
+    assert (distances.passed, distances.guilty) == (False, "cuda")
 
 
 def test_an_outcome_is_json_and_names_a_ray() -> None:
