@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help setup render gallery docs test lint format clean distclean
+.PHONY: help setup render gallery validate docs test lint format clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -18,6 +18,9 @@ render: setup ## render scenes/classic.toml to out/classic.png and out/classic.e
 
 gallery: setup ## render every scene of scenes/ into docs/gallery; what did not change is not rendered again
 	@$(BIN)/python -m scripts.gallery
+
+validate: setup ## compare with Mitsuba ray by ray: the full report, its summary in reports/, the headline numbers in README.md
+	@$(BIN)/tracer validate --full --summary reports/crossvalidation.md --headline README.md
 
 docs: setup ## build the documentation site into build/docs; open build/docs/index.html
 	@$(BIN)/python -m sphinx -q -W -n --keep-going -d build/doctrees docs build/docs
