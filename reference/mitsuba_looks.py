@@ -41,7 +41,7 @@ class Look:
 
 def look_of(scene: Scene, shape: ShapeRecord, body: Body) -> Look:
     """The look of a shape; pictures on planes and meshes and checkers on planes along the axes are kept."""
-    texture = _texture(scene, shape)
+    texture = texture_record(scene, shape)
     back = np.eye(3, 4)
     if inherited(scene, shape, "texture_space") == "object":
         back = shape.placement.inverse()
@@ -82,7 +82,8 @@ def numbers(values: Sequence[float] | np.ndarray) -> str:
     return ", ".join(repr(float(value)) for value in np.ravel(values))
 
 
-def _texture(scene: Scene, shape: ShapeRecord) -> TextureRecord:
+def texture_record(scene: Scene, shape: ShapeRecord) -> TextureRecord:
+    """The texture of a shape, or of the mesh that it shares; a color is a texture, too."""
     has_own = shape.texture is not None or shape.color is not None
     source = shape if has_own else source_of(scene, shape)
     if source.texture is not None:

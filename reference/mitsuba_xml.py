@@ -9,9 +9,8 @@ from __future__ import annotations
 import math
 import os
 import shutil
-import tempfile
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
 import numpy as np
@@ -21,6 +20,7 @@ from reference.adapters.extent import extent_of
 from reference.adapters.geometry import Disk, Triangles
 from reference.adapters.plugins import mesh_plugin
 from reference.adapters.shapes import Surroundings
+from reference.exported import Exported, beside
 from reference.mitsuba_elements import add_point, analytic, comment, sensor, square
 from reference.mitsuba_exposure import light_strength
 from reference.mitsuba_looks import Look, add, bsdf, look_of, numbers
@@ -29,7 +29,6 @@ from reference.mitsuba_variant import mitsuba
 from tracer.canvas import Canvas
 from tracer.color import decode_srgb
 from tracer.device_meshes import placed_meshes
-from tracer.errors import OutputError
 from tracer.scene import Scene
 
 PICTURE_FACTOR = 30.0
@@ -38,14 +37,6 @@ precision stay exact to a hundredth of a texel."""
 
 SAMPLES = 64
 MAX_DEPTH = 24
-
-
-class Exported(NamedTuple):
-    """What was written: the `file`, the `pieces` beside it, and `remarks` on what has no counterpart."""
-
-    file: Path
-    pieces: list[Path]
-    remarks: list[str]
 
 
 def export_mitsuba(scene: Scene, path: str | os.PathLike[str], canvas: Canvas | None = None) -> Exported:
@@ -57,22 +48,13 @@ def export_mitsuba(scene: Scene, path: str | os.PathLike[str], canvas: Canvas | 
     """
     mi = mitsuba()
     scene.check()
-    target = Path(os.path.realpath(path))
-    try:
-        with tempfile.TemporaryDirectory(prefix=".tracer-", dir=target.parent) as folder:
-            file = Path(folder) / target.name
-            document = _Document(scene, canvas or Canvas.of(scene.camera, scene.literal), file, mi)
-            document.write()
-            document.strength = light_strength(scene, mi.load_file(str(file)))
-            document.write()
-            mi.load_file(str(file))
-            # The file itself comes last: it never stands without what it names.
-            pieces = sorted(piece for piece in Path(folder).iterdir() if piece != file)
-            for piece in [*pieces, file]:
-                os.replace(piece, target.with_name(piece.name))
-    except OSError as error:
-        raise OutputError(f"{os.fspath(path)}: cannot be written: {error.strerror or error}") from error
-    return Exported(target, [target.with_name(piece.name) for piece in pieces], document.remarks)
+    with beside(path) as (file, written):
+        document = _Document(scene, canvas or Canvas.of(scene.camera, scene.literal), file, mi)
+        document.write()
+        document.strength = light_strength(scene, mi.load_file(str(file)))
+        document.write()
+        mi.load_file(str(file))
+    return Exported(written[-1], written[:-1], document.remarks)
 
 
 class _Document:

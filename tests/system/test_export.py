@@ -144,7 +144,7 @@ def test_the_numbers_of_the_shapes_survive(tmp_path: Path) -> None:
         (["--to", "mitsuba", "-o", "a.obj"], 'a.obj: the extension ".obj" is unknown; allowed: .xml'),
         (["--to", "mitsuba", "-o", "gone/a.xml"], "gone/a.xml: the folder gone does not exist"),
         (["--to", "mitsuba", "--scale", "0"], "scale: 0.0 is out of range; allowed is a number above 0"),
-        (["--to", "blender"], "Invalid value for '--to': 'blender' is not 'mitsuba'."),
+        (["--to", "blender"], "Invalid value for '--to': 'blender' is not one of 'mitsuba', 'povray'."),
         ([], "Missing option '--to'."),
     ],
 )
