@@ -92,7 +92,8 @@ class MitsubaScene:
         return ray
 
     def intersect(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike | None = None) -> Hits:
-        """The nearest hits with 0 <= t <= `t_max` (a number or (n,)) along unit directions."""
+        """The nearest hits with 0 < t <= `t_max` (a number or (n,)) along unit directions. Mitsuba counts
+        t = 0 as well, the model does not: such rays are asked once more, from a little farther on."""
         import drjit as dr
 
         if not np.size(origins):
@@ -107,7 +108,20 @@ class MitsubaScene:
         miss = ~valid[:, None]
         p = o + np.where(valid, t, np.nan)[:, None] * d
         n = np.where(miss, np.nan, si.n.numpy().T.astype(np.float64))
-        return Hits(t, shape, primitive, p, n, valid)
+        hits = Hits(t, shape, primitive, p, n, valid)
+        at_start = np.flatnonzero(t == 0)
+        return self._asked_again(hits, o, d, at_start, t_max) if len(at_start) else hits
+
+    def _asked_again(
+        self, hits: Hits, o: np.ndarray, d: np.ndarray, k: np.ndarray, t_max: ArrayLike | None
+    ) -> Hits:
+        """The hits with those of some rays (by number) from a step further on in place of their own."""
+        step = SHADOW_START * np.maximum(self.extent, np.abs(o[k]).max(axis=1))
+        limit = None if t_max is None else np.broadcast_to(np.asarray(t_max), len(o))[k] - step
+        other = self.intersect(o[k] + step[:, None] * d[k], d[k], limit)
+        for name, found in vars(other).items():
+            getattr(hits, name)[k] = found + step if name == "t" else found
+        return hits
 
     def visible(self, points: ArrayLike, targets: ArrayLike) -> np.ndarray:
         """(n,) bool: nothing lies between points and targets (n, 3), 1e-5 S at either end left out.
@@ -151,11 +165,18 @@ class MitsubaScene:
         integrator = mi.load_dict({"type": "depth"})
         picture = mi.render(self.scene, sensor=sensor, integrator=integrator, spp=1)
         depth = picture.numpy()[:, :, 0].astype(np.float64)
+        if self.view.samples == 1 and (depth == 0).any():  # a miss, or something that the canvas touches
+            hits = self.intersect(*self.camera_rays())
+            there = np.where(hits.valid, hits.t, 0).reshape(depth.shape)
+            depth = np.where(depth == 0, there, depth)
         return np.where(depth == 0, -1.0, depth)
 
 
-def build(scene: Scene, supersample: int = 1, canvas: Canvas | None = None) -> MitsubaScene:
-    """The scene in Mitsuba; `canvas` replaces the camera's own, such as a scaled one.
+def build(
+    scene: Scene, supersample: int = 1, canvas: Canvas | None = None, reach: float = 1.0
+) -> MitsubaScene:
+    """The scene in Mitsuba; `canvas` replaces the camera's own, such as a scaled one; `reach`: by how much
+    the disks that stand for planes are larger than usual.
 
     Raises `MachineError` without Mitsuba, `SceneError` where a file cannot be used, `UsageError` for a kind
     of shape without adapter.
@@ -165,7 +186,7 @@ def build(scene: Scene, supersample: int = 1, canvas: Canvas | None = None) -> M
     canvas = canvas or exact_canvas(scene)
     meshes = placed_meshes(scene)
     extent = extent_of(scene, canvas, meshes)
-    around = Surroundings(scene, meshes, extent)
+    around = Surroundings(scene, meshes, extent, reach)
     bodies = {number: body_of(number, shape, around) for number, shape in enumerate(scene.shapes)}
     tree = {"type": "scene", "embree_use_robust_intersections": True}
     tree |= {

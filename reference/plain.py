@@ -25,7 +25,8 @@ from typing import Any, NamedTuple
 import numpy as np  # holds the finished picture, does no arithmetic
 from numpy.typing import NDArray
 
-from reference.plain_files import BUILTIN_MESHES, MeshFile, cut_into_fans, read_mesh, read_picture
+from reference.plain_files import BUILTIN_MESHES, read_mesh, read_picture
+from reference.plain_polygons import MeshFile, cut_polygons
 
 EPSILON = sys.float_info.epsilon
 BLANK = -1.0  # the depth of a ray that hits nothing
@@ -777,7 +778,7 @@ class Mesh:
 
     vertices: Sequence[Vec]
     triangles: Sequence[tuple[int, int, int]]
-    normals: Sequence[Vec]  # (0, 0, 0) marks a degenerate triangle, which is never hit
+    normals: Sequence[Vec]  # (0, 0, 0) marks a triangle that is never hit: degenerate, or a repetition
     corner_normals: Sequence[tuple[Vec, Vec, Vec]] | None
     low: Vec
     high: Vec
@@ -1297,7 +1298,7 @@ class Loader:
             return mesh(read_mesh(self.base_dir / entry["file"]), to_world, smooth)
         if "builtin" in entry:
             return mesh(BUILTIN_MESHES[entry["builtin"]], to_world, smooth)
-        return mesh(cut_into_fans([vec(v) for v in entry["vertices"]], entry["faces"]), to_world, smooth)
+        return mesh(cut_polygons([vec(v) for v in entry["vertices"]], entry["faces"]), to_world, smooth)
 
 
 def material(entry: Table) -> Material:
@@ -1412,6 +1413,7 @@ def mesh(source: MeshFile, to_world: Transform, smooth: bool) -> Mesh:
     """Vertices are rounded to single precision as read and once more after the move.
 
     A mesh that the transform mirrors is wound the other way round, so that its normals stay outward.
+    A triangle with the corners of an earlier one is never hit.
     """
     vertices = [single(to_world.point(single(vec(vertex)))) for vertex in source.vertices]
     mirrored = to_world.scale.x * to_world.scale.y * to_world.scale.z < 0
@@ -1422,9 +1424,14 @@ def mesh(source: MeshFile, to_world: Transform, smooth: bool) -> Mesh:
         moved = [[to_world.normal(vec(n)) for n in normals] for normals in source.corner_normals]
         corner_normals = [(a, c, b) if mirrored else (a, b, c) for a, b, c in moved]
     elif smooth:
-        corner_normals = area_weighted(len(vertices), triangles, areas)
+        numbers = source.places or range(len(vertices))
+        shared = [(numbers[a], numbers[b], numbers[c]) for a, b, c in triangles]
+        corner_normals = area_weighted(len(vertices), shared, areas)
+    first: dict[frozenset[Vec], int] = {}
+    same = [first.setdefault(frozenset(vertices[k] for k in t), n) for n, t in enumerate(triangles)]
+    normals = [unit(area) if same[n] == n else BLACK for n, area in enumerate(areas)]
     low, high = (Vec(*(pick(axis) for axis in zip(*vertices, strict=True))) for pick in (min, max))
-    return Mesh(vertices, triangles, [unit(area) for area in areas], corner_normals, low, high)
+    return Mesh(vertices, triangles, normals, corner_normals, low, high)
 
 
 def area_weighted(

@@ -1,14 +1,12 @@
-"""Meshes and pictures for `reference.plain`: OBJ, PLY, PNG and JPEG files, and the two built-in solids.
+"""Meshes and pictures for `reference.plain`: OBJ, PLY, STL, PNG and JPEG files, and the two built-in solids.
 
-Polygons are cut into fans in file order, indices start at 0; picture values are display values in [0, 1]
-(document, sections 5 and 6).
+Indices start at 0; picture values are display values in [0, 1] (document, sections 5 and 6).
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -17,40 +15,19 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Point = tuple[float, float, float]
+from reference.plain_gltf import read_gltf
+from reference.plain_polygons import MeshFile, Point, cut_polygons
+
 Take = Callable[[str, int], Any]  # the next `count` numbers of a type
-
-
-@dataclass(frozen=True)
-class MeshFile:
-    """Positions, triangles as vertex numbers, and three normals a triangle (None unless the file has all)."""
-
-    vertices: list[Point]
-    triangles: list[tuple[int, int, int]]
-    corner_normals: list[tuple[Point, Point, Point]] | None = None
-
-
-def cut_into_fans(
-    vertices: list[Point],
-    polygons: Sequence[Sequence[int]],
-    corner_normals: Sequence[Sequence[Point]] | None = None,
-) -> MeshFile:
-    """Triangles (0, 1, 2), (0, 2, 3), ... of every polygon, in file order."""
-    fans = [(number, k) for number, polygon in enumerate(polygons) for k in range(1, len(polygon) - 1)]
-    triangles = [(polygons[p][0], polygons[p][k], polygons[p][k + 1]) for p, k in fans]
-    if corner_normals is None:
-        return MeshFile(vertices, triangles)
-    normals = [(corner_normals[p][0], corner_normals[p][k], corner_normals[p][k + 1]) for p, k in fans]
-    return MeshFile(vertices, triangles, normals)
 
 
 # Wound outward; the cube's faces are -x +x -y +y -z +z, the tetrahedron's face k is opposite to corner k.
 BUILTIN_MESHES = {
-    "cube": cut_into_fans(
+    "cube": cut_polygons(
         [(x, y, z) for z in (-1.0, 1.0) for y in (-1.0, 1.0) for x in (-1.0, 1.0)],
         [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]],
     ),
-    "tetrahedron": cut_into_fans(
+    "tetrahedron": cut_polygons(
         [(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)],
         [[1, 3, 2], [0, 2, 3], [0, 3, 1], [0, 1, 2]],
     ),
@@ -58,8 +35,9 @@ BUILTIN_MESHES = {
 
 
 def read_mesh(path: Path) -> MeshFile:
-    """The mesh of a Wavefront OBJ or Stanford PLY file, chosen by the file's ending."""
-    return read_ply(path) if path.suffix.lower() == ".ply" else read_obj(path)
+    """The mesh of a file, in the format that its ending says."""
+    readers = {".obj": read_obj, ".ply": read_ply, ".stl": read_stl, ".gltf": read_gltf, ".glb": read_gltf}
+    return readers[path.suffix.lower()](path)
 
 
 def read_obj(path: Path) -> MeshFile:
@@ -79,7 +57,7 @@ def read_obj(path: Path) -> MeshFile:
             with_normal = [corner[2] for corner in corners if len(corner) == 3 and corner[2]]
             corner_normals.append([normals[obj_index(number, len(normals))] for number in with_normal])
     complete = all(len(p) == len(n) for p, n in zip(polygons, corner_normals, strict=True))
-    return cut_into_fans(vertices, polygons, corner_normals if complete else None)
+    return cut_polygons(vertices, polygons, corner_normals if complete else None)
 
 
 def obj_lines(path: Path) -> Iterator[list[str]]:
@@ -120,9 +98,9 @@ def read_ply(path: Path) -> MeshFile:
     key = "vertex_indices" if faces and "vertex_indices" in faces[0] else "vertex_index"
     polygons = [[int(k) for k in face[key]] for face in faces]
     if not vertices or "nx" not in elements["vertex"][0]:
-        return cut_into_fans(vertices, polygons)
+        return cut_polygons(vertices, polygons)
     normals = [(v["nx"], v["ny"], v["nz"]) for v in elements["vertex"]]
-    return cut_into_fans(vertices, polygons, [[normals[k] for k in polygon] for polygon in polygons])
+    return cut_polygons(vertices, polygons, [[normals[k] for k in polygon] for polygon in polygons])
 
 
 def ply_elements(lines: list[list[str]], take: Take) -> dict[str, list[dict[str, Any]]]:
@@ -164,6 +142,24 @@ def binary_values(body: bytes, order: str) -> Take:
     return take
 
 
+def read_stl(path: Path) -> MeshFile:
+    """The facets of an STL file, ascii or binary; each brings its own vertices."""
+    data = path.read_bytes()
+    count = int.from_bytes(data[80:84], "little")
+    if len(data) == 84 + 50 * count:
+        facets = [struct.unpack_from("<9f", data, 96 + 50 * k) for k in range(count)]
+        vertices = [point(facet[i : i + 3]) for facet in facets for i in (0, 3, 6)]
+    else:
+        lines = (line.split() for line in data.decode("utf-8", errors="replace").lower().splitlines())
+        named = ("solid", "endsolid")  # and any words as their names
+        words = [word for line in lines if line and line[0] not in named for word in line]
+        places_of_vertices = [k for k, word in enumerate(words) if word == "vertex"]
+        vertices = [point(words[k + 1 : k + 4]) for k in places_of_vertices]
+    first: dict[tuple[np.float32, ...], int] = {}
+    places = [first.setdefault(tuple(map(np.float32, v)), number) for number, v in enumerate(vertices)]
+    return MeshFile(vertices, [(k, k + 1, k + 2) for k in range(0, len(vertices), 3)], None, places)
+
+
 def read_picture(path: Path) -> NDArray[np.float64]:
     """The (h, w, 3) display values in [0, 1] of a PNG or JPEG; gray is repeated, alpha dropped."""
     flags = cv2.IMREAD_UNCHANGED | cv2.IMREAD_IGNORE_ORIENTATION
@@ -177,7 +173,7 @@ def read_picture(path: Path) -> NDArray[np.float64]:
     return np.ascontiguousarray(channels[:, :, 2::-1])  # OpenCV stores blue, green, red
 
 
-def point(values: Iterable[str]) -> Point:
-    """Three numbers of a text."""
+def point(values: Iterable[str | float]) -> Point:
+    """Three numbers, those of a text as well."""
     x, y, z = values
     return (float(x), float(y), float(z))

@@ -30,7 +30,11 @@ TOLERANCES: dict[str, Tolerance] = {
         "5",
     ),
     "position": Tolerance(
-        16, "eps S", "|dp.n|: the point is put back onto its surface, which costs one n.p", "5"
+        16,
+        "eps S",
+        "|dp.n| and |dp| cos: the point is o + t d with the error of t, put back onto its surface, which "
+        "costs one n.p",
+        "5",
     ),
     "normal": Tolerance(
         16, "eps S / (r cos theta)", "a sphere's normal turns by dp / r, and dp along the surface is dt", "5"
@@ -95,6 +99,59 @@ TOLERANCES: dict[str, Tolerance] = {
         "rays that differ in the grazing band; 2 % of the free rays are aimed within 1e-4 r of silhouettes; "
         "measured up to 1.2e-4 in half a million rays, 2.8e-4 in 18,000",
         "measured",
+    ),
+    "placement": Tolerance(
+        4,
+        "eps S",
+        "turning and scaling cost 5 products in double precision; spheres and planes are rounded once to the "
+        "precision of the tables, vertices to single precision, where neighbors may round apart",
+        "5, 4",
+    ),
+    "canvas moves": Tolerance(
+        504,
+        "eps S",
+        "largest move of the canvas that must change a pixel which may differ: three times the shift 1e-5 of "
+        "the borders of texture cells, for surfaces oblique to all axes",
+        "6",
+    ),
+    "start moves": Tolerance(
+        16,
+        "factor",
+        "largest other start of the reference's secondary rays: one that leaves a triangle at a cosine of "
+        "1e-3 may meet it once more beyond the usual start",
+        "measured",
+    ),
+    "edge on": Tolerance(
+        1e-3,
+        "cosine",
+        "a pixel that sees its surface as flat may differ: the reference's point is off it by eps S, and a "
+        "ray that leaves as flat meets it again eps S / 1e-3 from there, beyond its start",
+        "measured",
+    ),
+    "normal edge on": Tolerance(
+        1e-4,
+        "cosine",
+        "an interpolated normal seen so flat: rounding decides whether it faces the ray, and counts",
+        "5",
+    ),
+    "horizon": Tolerance(
+        1e4,
+        "S",
+        "planes may be missed beyond it: a disk stands for a plane in Mitsuba, and ends at 1e5 S",
+        "measured",
+    ),
+    "start step": Tolerance(
+        1e-5,
+        "S",
+        "Mitsuba's rays start so far along themselves, so that they do not meet again what they leave; at "
+        "1e-6 some do",
+        "measured",
+    ),
+    "far points": Tolerance(
+        4,
+        "S",
+        "points farther away are not asked what they see: both sides scale their guards by the farthest",
+        "4",
     ),
     "left out": Tolerance(
         0.01,

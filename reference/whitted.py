@@ -10,13 +10,15 @@ nearer than 1e-5 of the scene is therefore not met; `tracer` has no such limit.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from copy import copy
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import tracer
-from reference.whitted_lights import jitter_of
+from reference.whitted_lights import jitter_of, opaque_vector
 from reference.whitted_tables import encode_srgb
 from reference.whitted_tree import Counts, trace, unit
 from reference.whitted_types import Array3f, Bool, Float, UInt32, UInt64, dr
@@ -42,6 +44,7 @@ def render(
     supersample: int | None = None,
     crop: Rectangle | None = None,
     start: float = START,
+    reach: float = 1.0,
 ) -> Picture:
     """The picture of a scene, or the part `crop` of it.
 
@@ -49,12 +52,13 @@ def render(
         scene: from `tracer.load` or built in code; its depth of field is left out.
         supersample: n for n x n rays a pixel; None: as the scene says.
         crop: (x0, y0, x1, y1) in pixels of the full picture, end exclusive.
-        start: how far along themselves secondary rays start, in sizes of coordinates. What changes with it is
-            what this reference cannot say.
+        start: how far along themselves secondary rays start, in sizes of coordinates.
+        reach: by how much the disks that stand for planes are larger than usual. What changes with these two
+            is what this reference cannot say.
 
     Raises: `MachineError` without Mitsuba, `SceneError` where a file cannot be used.
     """
-    return Whitted(scene, supersample, crop, start).render()
+    return Whitted(scene, supersample, crop, start, reach).render()
 
 
 class Whitted:
@@ -66,11 +70,25 @@ class Whitted:
         supersample: int | None = None,
         crop: Rectangle | None = None,
         start: float = START,
+        reach: float = 1.0,
     ) -> None:
         self.n = supersample or scene.camera.supersample
         self.rectangle = crop or (0, 0, *scene.camera.resolution)
         self.linear = scene.color_space == "linear"
-        self.world = world_of(scene, self.n, start)
+        self.world = world_of(scene, self.n, start, reach)
+
+    def varied(
+        self, shift: ArrayLike = (0, 0, 0), start: float | None = None, cell_shift: float | None = None
+    ) -> Whitted:
+        """The same scene with canvas and eye moved, another start of secondary rays, another small value at
+        the borders of texture cells."""
+        twin, canvas, tables = copy(self), self.world.canvas, self.world.tables
+        if cell_shift is not None:
+            tables = replace(tables, cell_shift=dr.opaque(Float, cell_shift))
+        moved = replace(canvas, center=canvas.center + opaque_vector(shift))
+        begin = self.world.start if start is None else dr.opaque(Float, start)
+        twin.world = replace(self.world, canvas=moved, tables=tables, start=begin)
+        return twin
 
     def render(self) -> Picture:
         """The picture, with its rays counted."""
@@ -84,6 +102,15 @@ class Whitted:
             color, depth = color + values, nearer(depth, near)
             merge(totals, lanes.counts)
         return Picture(self._shown(color), depth.numpy().reshape(y1 - y0, x1 - x0), totals)
+
+    def still(self) -> Picture:
+        """The picture with nothing counted; from the second call on without tracing the kernel in Python."""
+        x0, y0, x1, y1 = self.rectangle
+        color, depth = Float(0), Float(-1)
+        for number in range(self.n**2):
+            values, near = frozen_picture(self.world, self.rectangle, *self._part(number))
+            color, depth = color + values, nearer(depth, near)
+        return Picture(self._shown(color), depth.numpy().reshape(y1 - y0, x1 - x0), {})
 
     def color(self) -> np.ndarray:
         """The colors alone; from the second call on without tracing the kernel in Python."""
@@ -156,11 +183,18 @@ def in_order(values: Any, lanes: Lanes, rectangle: Rectangle) -> Float:
     return picture
 
 
-@dr.freeze
+@dr.freeze(state_fn=None, limit=2, warn_after=1_000_000)  # each scene has a recording of its own
 def frozen_color(world: World, rectangle: Rectangle, sub_ray: UInt32, n: UInt32) -> Float:
     """The colors alone, nothing counted."""
     lanes = trace_lanes(world, rectangle, sub_ray, n, count=False)
     return in_order(lanes.color, lanes, rectangle)
+
+
+@dr.freeze(state_fn=None, limit=2, warn_after=1_000_000)  # each scene has a recording of its own
+def frozen_picture(world: World, rectangle: Rectangle, sub_ray: UInt32, n: UInt32) -> tuple[Float, Float]:
+    """Colors and depths, nothing counted."""
+    lanes = trace_lanes(world, rectangle, sub_ray, n, count=False)
+    return in_order(lanes.color, lanes, rectangle), in_order(lanes.depth, lanes, rectangle)
 
 
 def pixel_of_lane(width: int, height: int) -> tuple[UInt32, UInt32, Bool]:

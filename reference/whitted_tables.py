@@ -21,6 +21,9 @@ STRIPES, CHECKER, PICTURE, TRUNCATE, FLIP_V, BILINEAR, OBJECT_SPACE, MESH, SMOOT
 SHAPE_ROWS, FRAME_ROWS, PICTURE_ROWS, CORNER_ROWS = 4, 3, 3, 3
 
 
+CELL_SHIFT = 1e-5  # of a point's largest coordinate in cells: the model's value in single precision
+
+
 @dataclass(frozen=True)
 class Tables:
     """The scene's numbers in Dr.Jit memory.
@@ -28,7 +31,8 @@ class Tables:
     `shapes`: 4 rows a shape, see `ShapeRow`. `palette`: a row a color. By shape, or None where no shape needs
     it: `frames`, 3 rows, from the world to the shape's own space; `pictures`, 2 rows to texels and the number
     of lines. By triangle, or None: `facets`, a row of normal and plane constant; `corners`, 3 rows of
-    normals. `flags`: all bits that occur in the scene; they are part of the kernel.
+    normals. `flags`: all bits that occur in the scene; they are part of the kernel. `cell_shift`: the small
+    value at borders of texture cells, in a point's largest coordinate in cells.
     """
 
     shapes: Float
@@ -38,6 +42,7 @@ class Tables:
     facets: Float | None
     corners: Float | None
     flags: int
+    cell_shift: Float
 
     def has(self, flag: int) -> bool:
         """Whether some shape has that flag."""
@@ -127,13 +132,14 @@ class TableMaker:
         entries = [self._shape(shape, bits) for shape, bits in zip(shapes, flags, strict=True)]
         occurring = int(np.bitwise_or.reduce([0, *flags]))
         return Tables(
-            shapes=owned_table(entries),
+            shapes=owned_table(entries or np.zeros((1, 4 * SHAPE_ROWS))),  # all triangles may be degenerate
             palette=owned_table(np.concatenate([*self._palette, np.zeros((1, 4))])),
             frames=owned_table([frame_rows(s) for s in shapes]) if occurring & OBJECT_SPACE else None,
             pictures=owned_table([picture_rows(s) for s in shapes]) if occurring & PICTURE else None,
             facets=owned_table(np.concatenate(self._facets)) if occurring & MESH else None,
             corners=owned_table(np.concatenate(self._corners)) if occurring & SMOOTH else None,
             flags=occurring,
+            cell_shift=dr.opaque(Float, CELL_SHIFT),
         )
 
     def _shape(self, shape: plain.Shape, flags: int) -> list[float]:

@@ -22,8 +22,6 @@ from reference.whitted_tables import (
 )
 from reference.whitted_types import Array3f, Array4f, Bool, Float, UInt32, dr
 
-CELL_SHIFT = 1e-5  # of a point's largest coordinate in cells: the model's value in single precision
-
 
 def own_color(tables: Tables, row: ShapeRow, p: Array3f, active: Bool) -> Array3f:
     """C (3, n): the color of the texture at p (3, n)."""
@@ -33,12 +31,12 @@ def own_color(tables: Tables, row: ShapeRow, p: Array3f, active: Bool) -> Array3
     entry, truncate = row.first, row.has(TRUNCATE) if tables.has(TRUNCATE) else None
     if tables.has(STRIPES | CHECKER):
         q = p * row.rate
-        largest = dr.max(dr.abs(q))
+        shift = tables.cell_shift * dr.maximum(dr.max(dr.abs(q)), 1)
         number = Float(0)
         if tables.has(STRIPES):
-            number = dr.select(row.has(STRIPES), cell(q.x + q.y + q.z, largest, truncate), number)
+            number = dr.select(row.has(STRIPES), cell(q.x + q.y + q.z, shift, truncate), number)
         if tables.has(CHECKER):
-            checks = sum(cell(coordinate, largest, truncate) for coordinate in q)
+            checks = sum(cell(coordinate, shift, truncate) for coordinate in q)
             number = dr.select(row.has(CHECKER), checks, number)
         entry += dr.select(row.has(STRIPES | CHECKER), modulo(number, row.count), 0)
     if not tables.has(PICTURE):
@@ -48,7 +46,8 @@ def own_color(tables: Tables, row: ShapeRow, p: Array3f, active: Bool) -> Array3
     u, v = affine(u_row, p), affine(v_row, p)
     lines: Any = dr.reinterpret_array(UInt32, sizes.x)
     largest = dr.maximum(dr.abs(u), dr.abs(v))
-    texel = texel_number(row, lines, cell(u, largest, truncate), cell(v, largest, truncate))
+    shift = tables.cell_shift * dr.maximum(largest, 1)
+    texel = texel_number(row, lines, cell(u, shift, truncate), cell(v, shift, truncate))
     color = palette(tables, entry + dr.select(is_picture, texel, 0), active)
     if tables.has(BILINEAR):
         smooth = is_picture & row.has(BILINEAR)
@@ -56,9 +55,8 @@ def own_color(tables: Tables, row: ShapeRow, p: Array3f, active: Bool) -> Array3
     return color
 
 
-def cell(q: Float, largest: Float, truncate: Bool | None) -> Float:
+def cell(q: Float, shift: Float, truncate: Bool | None) -> Float:
     """F(q); under the document's rule its absolute value, by which cells count there."""
-    shift = CELL_SHIFT * dr.maximum(largest, 1)
     upright = dr.floor(q + shift)
     return upright if truncate is None else dr.select(truncate, dr.floor(dr.abs(q) + shift), upright)
 

@@ -108,10 +108,10 @@ class World:
     options: Options
 
 
-def world_of(scene: tracer.Scene, supersample: int, start: float) -> World:
-    """The scene in memory."""
+def world_of(scene: tracer.Scene, supersample: int, start: float = START, reach: float = 1.0) -> World:
+    """The scene in memory; `reach`: by how much the disks that stand for planes are larger than usual."""
     read = plain_world(scene)
-    geometry = build(scene, supersample)
+    geometry = build(scene, supersample, reach=reach)
     return World(
         scene=geometry.scene,
         tables=TableMaker(read, geometry.numbers.tolist()).tables(),

@@ -27,17 +27,19 @@ LARGEST_RADIUS = 1e18
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What an adapter may ask: the `scene`, the placed `meshes` by shape number, the `extent` S."""
+    """What an adapter may ask: the `scene`, the placed `meshes` by shape number, the `extent` S; `reach`:
+    factor of the size of disks that stand for planes."""
 
     scene: Scene
     meshes: Mapping[int, PlacedMesh]
     extent: float
+    reach: float = 1.0
 
 
 def plane(number: int, shape: ShapeRecord, around: Surroundings) -> Disk:
     """A disk of 1e5 scene extents; its front is the plane's positive side."""
     row = shape.placed_coefficients()  # type: ignore[attr-defined]
-    return Disk(row[:3], float(row[3]), min(DISK_FACTOR * around.extent, LARGEST_RADIUS))
+    return Disk(row[:3], float(row[3]), min(DISK_FACTOR * around.extent * around.reach, LARGEST_RADIUS))
 
 
 def sphere(number: int, shape: ShapeRecord, around: Surroundings) -> Ball:

@@ -15,9 +15,6 @@ from reference.tolerances import TOLERANCES
 
 Array = np.ndarray
 
-EDGE_ON = 1e-4
-"""Cosine of an interpolated normal and the ray below which rounding decides whether the normal counts."""
-
 
 @dataclass(frozen=True)
 class Bends:
@@ -70,7 +67,7 @@ def _bends(case: Case, refracts: bool) -> Bends:
         exact, k = extended.mirror(d, normal), extended.number(np.ones(len(cosine)))
     curve = sizes(truth, s.o, s.p) / bend_radius(truth, s.shape, s.primitive)
     columns = (extended.double(normal), extended.double(exact), extended.double(k), extended.double(eta))
-    return Bends(s, *columns, entering, curve, sure & (cosine > EDGE_ON))
+    return Bends(s, *columns, entering, curve, sure & (cosine > TOLERANCES["normal edge on"].value))
 
 
 def bend_radius(truth: Truth, shape: Array, primitive: Array) -> Array:

@@ -12,7 +12,7 @@ import tracer
 from reference import extended, mitsuba_scene
 from reference.comparison.rays import RaySet, comparison_rays, single
 from reference.comparison.truth import MESH, SPHERE, Truth
-from reference.tolerances import EPSILON
+from reference.tolerances import EPSILON, TOLERANCES
 from tracer.shapes import Sphere
 
 Array = np.ndarray
@@ -20,8 +20,8 @@ Array = np.ndarray
 PIXELS = 40_000
 """Pixels of a picture that is compared, at most."""
 
-HORIZON = 1e4
-"""Planes that are hit farther away than this many extents S may be missed: Mitsuba's are disks, and end."""
+HORIZON = TOLERANCES["horizon"].value
+"""Planes that are hit farther away than this many extents S may be missed."""
 
 
 class Bench:
@@ -121,12 +121,13 @@ def in_ulp(error: Array, value: Array | None, precision: str) -> Array:
 
 
 def comparable(scene: tracer.Scene) -> tracer.Scene:
-    """The scene with spheres placed and rounded to single precision, but for those whose texture needs their
-    own frame."""
+    """The scene with spheres placed, by the plain version, and rounded to single precision, but for those
+    whose texture needs their own frame."""
+    rows = Truth.of(scene).rows
     shapes = []
-    for shape in scene.shapes:
+    for number, shape in enumerate(scene.shapes):
         if isinstance(shape, Sphere) and shape.texture_space != "object":
-            *center, radius = single(shape.placed_coefficients()).tolist()
+            *center, radius = single(rows[number]).tolist()
             placed = {"center": tuple(center), "radius": radius, "scale": 1.0, "rotate": (0.0,) * 3}
             shape = shape.model_copy(update=placed | {"translate": (0.0,) * 3})
         shapes.append(shape)

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from reference.comparison import grazing
 from reference.comparison.case import Case, roundness, sizes, truth_of_hits
-from reference.comparison.decisions import Answers, hit_distance, judge_ids
-from reference.comparison.hits import farther, rim_clearance
+from reference.comparison.decisions import Answers, Questions, judge_ids, tie_or_edge, true_answers
+from reference.comparison.hits import rim_clearance
 from reference.comparison.judge import SINGLE, Numbers, bounds, judge_numbers
 from reference.comparison.kinds import has_shapes
 from reference.comparison.records import Outcome, Panels, Term
@@ -45,17 +46,19 @@ def compare_mask(case: Case) -> Outcome:
     Mitsuba's depth integrator."""
     b = depth_buffers(case)
     blank = b.theirs < 0
-    ours = Answers(b.shape, b.primitive)
-    theirs = Answers(np.where(blank, -1, b.hits.shape), np.where(blank, -1, b.hits.primitive))
-    reach = farther(b.ours, b.theirs)
-    outcome = judge_ids(
-        case,
-        "depth buffer, mask",
+    ours = Answers(b.shape, b.primitive, b.ours)
+    theirs = Answers(np.where(blank, -1, b.hits.shape), np.where(blank, -1, b.hits.primitive), b.theirs)
+    true = true_answers(case, b.rays)
+    asked = Questions(
         b.rays,
         ours,
         theirs,
-        lambda k: hit_distance(case, b.rays, k, ours, theirs, reach),
+        ours_true=true,
+        mitsuba_true=true,
+        distance=lambda k: tie_or_edge(case, b.rays, k, ours, theirs),
+        starts=lambda k: grazing.start_distance(case.bench.truth, b.rays.o[k]),
     )
+    outcome = judge_ids(case, "depth buffer, mask", asked, "grazing pixels")
     size = b.picture.shape
     panels = Panels("depth", b.picture, b.theirs.reshape(size), ours.differ(theirs).reshape(size))
     return replace(outcome, panels=panels)

@@ -4,16 +4,36 @@ from __future__ import annotations
 
 import numpy as np
 
+import tracer
 from reference import extended
 from reference.comparison import optics
 from reference.comparison.bends import Bends, bends, total_band
 from reference.comparison.case import Case
+from reference.comparison.decisions import Decisions, judge_decisions
 from reference.comparison.judge import SINGLE, Numbers, bounds, judge_numbers
-from reference.comparison.kinds import by_kind, has_glass
+from reference.comparison.kinds import by_kind, glass_kinds, has_shapes
 from reference.comparison.records import Outcome, Term
+from reference.comparison.steps import steps
 from reference.tolerances import TOLERANCES
 
 Array = np.ndarray
+
+
+def compare_straight(case: Case) -> Outcome:
+    """Through index 1 a ray goes straight on, exactly: directions after as before, bit for bit. Mitsuba has
+    no say here."""
+    truth, s = case.bench.truth, steps(case)
+    crossed = s.refracts & (s.shape >= 0) & (s.vertex > 0)  # the first direction is normalized on the way
+    s = s.part(crossed & (truth.ior[s.shape] == 1))
+    bent = (s.out != s.d).any(axis=1)
+    decisions = Decisions(
+        rays=s.rays,
+        differ=bent,
+        in_band=lambda k: np.zeros(len(k), bool),
+        wrong=lambda k: (bent[k], np.zeros(len(k), bool)),
+        answers=lambda k: (f"goes on along {s.out[k].tolist()}", "not asked", f"along {s.d[k].tolist()}"),
+    )
+    return judge_decisions(case, "straight through", decisions)
 
 
 def of_kind(case: Case, b: Bends, kind: str) -> tuple[Bends, int]:
@@ -81,9 +101,15 @@ def _judge(
     return judge_numbers(case, term, numbers, bounds(case, name, "mitsuba direction"))
 
 
+def has_glass(kind: str, scene: tracer.Scene) -> bool:
+    """Whether shapes of that kind refract."""
+    return kind in glass_kinds(scene)
+
+
 def terms() -> list[Term]:
-    """Mirror and refraction by kind of shape."""
+    """Mirror and refraction by kind of shape, and index 1."""
     return [
+        Term("straight through", "direction after index 1", has_shapes, compare_straight),
         *by_kind("mirror", "direction after a mirror", compare_mirror),
         *by_kind("refraction", "direction after refraction", compare_refraction, has_glass),
     ]

@@ -97,8 +97,10 @@ def judge_numbers(case: Case, term: str, numbers: Numbers, allowed: Bounds) -> O
 
 
 def share_of(name: str, rays: int) -> int:
-    """How many of so many rays a row of the table of tolerances allows."""
-    return int(np.ceil(TOLERANCES[name].value * rays))
+    """How many of so many rays a row of the table of tolerances allows: its share, and of few rays as many
+    more as chance brings once in a thousand runs (three times the root of a Poisson count)."""
+    expected = TOLERANCES[name].value * rays
+    return int(np.ceil(expected + 3 * np.sqrt(expected)))
 
 
 def guilty_side(ours: float, mitsuba: float) -> Guilty:

@@ -8,10 +8,10 @@ from functools import partial
 import tracer
 from reference.comparison.case import Case
 from reference.comparison.records import Outcome, Term
-from reference.comparison.truth import MESH, PLANE, SPHERE
+from reference.comparison.truth import MESH, PLANE, SPHERE, material_of
 from tracer.shapes import Instance, Mesh, Plane, Sphere
 
-KINDS = {PLANE: (Plane,), SPHERE: (Sphere,), MESH: (Mesh, Instance)}
+KINDS: dict[str, tuple[type, ...]] = {PLANE: (Plane,), SPHERE: (Sphere,), MESH: (Mesh, Instance)}
 """The records of each kind of shape."""
 
 
@@ -25,31 +25,32 @@ def has_kind(kind: str, scene: tracer.Scene) -> bool:
     return any(isinstance(shape, KINDS[kind]) for shape in scene.shapes)
 
 
-def has_glass(scene: tracer.Scene) -> bool:
-    """Whether a material of the scene refracts."""
-    return has_shapes(scene) and any(material.ior != 1 for material in scene.materials.values())
+def glass_kinds(scene: tracer.Scene) -> set[str]:
+    """The kinds of the shapes whose index of refraction is not 1."""
+    return {
+        kind
+        for number, shape in enumerate(scene.shapes)
+        for kind, records in KINDS.items()
+        if isinstance(shape, records) and material_of(scene, number).ior != 1
+    }
 
 
 def by_kind(
     name: str,
     compares: str,
     run: Callable[[Case, str], Outcome],
-    applies: Callable[[tracer.Scene], bool] = has_shapes,
+    applies: Callable[[str, tracer.Scene], bool] = has_kind,
 ) -> list[Term]:
     """A term for each kind of shape, named `NAME, KIND`."""
     return [
         Term(
             f"{name}, {kind}",
             f"{compares}, of a {kind}",
-            partial(_applies, kind, applies),
+            partial(applies, kind),
             partial(_run, run, kind),
         )
         for kind in KINDS
     ]
-
-
-def _applies(kind: str, applies: Callable[[tracer.Scene], bool], scene: tracer.Scene) -> bool:
-    return has_kind(kind, scene) and applies(scene)
 
 
 def _run(run: Callable[[Case, str], Outcome], kind: str, case: Case) -> Outcome:

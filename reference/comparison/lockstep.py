@@ -6,9 +6,9 @@ import numpy as np
 
 from reference import extended
 from reference.comparison import grazing
-from reference.comparison.case import HORIZON, Case, roundness, sizes
-from reference.comparison.decisions import Answers, judge_ids
-from reference.comparison.hits import farther, rim_clearance
+from reference.comparison.case import Case, roundness, sizes
+from reference.comparison.decisions import Answers, Questions, judge_ids, tie_or_edge, true_answers
+from reference.comparison.hits import off_surface, rim_clearance
 from reference.comparison.judge import SINGLE, Numbers, bounds, judge_numbers
 from reference.comparison.kinds import by_kind, has_shapes
 from reference.comparison.records import Outcome, Term
@@ -21,33 +21,42 @@ Array = np.ndarray
 def compare_next_hit(case: Case) -> Outcome:
     """What each step of a chain reaches: the same primitive, and a sphere on the same side."""
     truth, s = case.bench.truth, steps(case)
-    ours_t, theirs_t = (np.nan_to_num(np.linalg.norm(p - s.o, axis=1)) for p in (s.p, s.theirs_p))
+    ours_t, theirs_t = (np.linalg.norm(p - s.o, axis=1) for p in (s.p, s.theirs_p))
+    ours, theirs = (
+        Answers(s.shape, s.primitive, ours_t),
+        Answers(s.theirs_shape, s.theirs_primitive, theirs_t),
+    )
+
+    def ours_true(k: Array) -> Answers:
+        return Answers(*truth.nearest(s.o[k], s.d[k], (s.left[k], s.left_primitive[k])))
 
     def distance(k: Array) -> Array:
-        """Also where Mitsuba's step begins next to a surface, or ours ends before that, half of how far apart
-        both hits are, and the horizon."""
-        near = s.part(k)
-        reach = np.maximum(ours_t, theirs_t)[k]
-        off = grazing.silhouette_distance(truth, near.origin, near.way, farther(ours_t, theirs_t)[k])
-        off = np.where(reach > HORIZON * case.bench.mitsuba.extent, 0, off)
-        off = np.minimum(off, grazing.start_distance(truth, near.origin))
-        both = (near.shape >= 0) & (near.theirs_shape >= 0)
-        off = np.where(both, np.minimum(off, np.abs(ours_t - theirs_t)[k] / 2), off)
-        return np.where((near.shape >= 0) & is_near(case, near, near.p, near.o), 0, off)
+        """Also half of how far apart the two hits are: where two surfaces meet both may be right."""
+        both = (s.shape[k] >= 0) & (s.theirs_shape[k] >= 0)
+        off = tie_or_edge(case, s.rays, k, ours, theirs)
+        return np.where(both, np.minimum(off, np.abs(ours_t - theirs_t)[k] / 2), off)
 
-    return judge_ids(
-        case,
-        "lockstep, next hit",
+    def starts(k: Array) -> Array:
+        """How far Mitsuba's step begins from a surface; 0 where ours meets one before it."""
+        near = s.part(k)
+        off = grazing.start_distance(truth, near.origin)
+        return np.where(is_near(case, near, near.p, near.o), 0, off)
+
+    asked = Questions(
         s.rays,
-        Answers(s.shape, s.primitive),
-        Answers(s.theirs_shape, s.theirs_primitive),
-        distance,
+        ours,
+        theirs,
+        ours_true=ours_true,
+        mitsuba_true=true_answers(case, s.rays),
+        distance=distance,
+        starts=starts,
         apart=parted(case, s),
     )
+    return judge_ids(case, "lockstep, next hit", asked)
 
 
 def compare_next_vertex(case: Case, kind: str) -> Outcome:
-    """|dt cos| of the steps from the second vertex on, in eps S."""
+    """|dt cos| of the steps from the second vertex on, for ours |dp.n| and |dp| cos, in eps S."""
     truth, (s, sure) = case.bench.truth, agreed_steps(case)
     wanted = (s.vertex > 0) & (truth.kind[s.shape] == kind)
     s, sure = s.part(wanted), sure[wanted]
@@ -65,13 +74,16 @@ def compare_next_vertex(case: Case, kind: str) -> Outcome:
     k = np.flatnonzero(sure & ~is_near(case, s, s.p, s.o))
     ours = (((s.p - s.o) * way).sum(axis=1) - t)[k]
     theirs = (((s.theirs_p - s.origin) * rounded).sum(axis=1) - their_t)[k]
-    across, their_across = ours * (cosine / extent)[k], theirs * (their_cosine / extent)[k]
+    exact = (s.o + t[:, None] * way)[k]
+    across = off_surface(s.p[k] - exact, normal[k], cosine[k]) / extent[k]
+    their_across = np.abs(theirs) * (their_cosine / extent)[k]
+    apart = np.abs(ours * cosine[k] - theirs * their_cosine[k]) / extent[k]
     numbers = Numbers(
         rays=s.rays,
         index=k,
-        difference=np.abs(across - their_across) / (SINGLE * condition[k]),
-        ours=np.abs(across) / case.epsilon,
-        mitsuba=np.abs(their_across) / (SINGLE * condition[k]),
+        difference=apart / (SINGLE * condition[k]),
+        ours=across / case.epsilon,
+        mitsuba=their_across / (SINGLE * condition[k]),
         unit="eps S / cos",
         answers=lambda i: (
             f"vertex {s.p[k[i]]} of shape {s.shape[k[i]]}",

@@ -1,65 +1,33 @@
 """The term of whole pictures: ours against the document's formula on Mitsuba's hits.
 
 Two programs, two ways to avoid self-hits, one model. A pixel may differ where a decision is grazing (a
-silhouette, an edge, the border of a shadow or of a texture's cell): its color in double precision moves when
-the canvas moves by some roundings of single precision, or the reference's own color does, or moves with the
-place at which its secondary rays start. Such pixels are counted.
+silhouette, an edge, the border of a shadow or of a texture's cell), see `doubt.py`. Such pixels are counted.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-import tracer
 from reference import extended, whitted
-from reference.comparison.canvas_moves import canvas_changes, largest_change
 from reference.comparison.case import Case
 from reference.comparison.decisions import LISTED
+from reference.comparison.doubt import doubt
 from reference.comparison.judge import replay, samples, share_of
 from reference.comparison.kinds import has_shapes
 from reference.comparison.records import Guilty, Outcome, Panels, Replay, Term
-from reference.comparison.renders import render_of
+from reference.comparison.renders import distance, render_of
 from reference.comparison.second_version import plain_colors
 from reference.tolerances import TOLERANCES
-from reference.whitted_world import START
 from tracer.compare import compare_pictures
 
 Array = np.ndarray
-
-EDGE_ON = 1e-3
-"""Cosine below which a ray sees its surface edge on: the reference's point is off it by eps S, so that a ray
-that leaves as flat meets it again as far as eps S / 1e-3 = 6e-5 S from the start."""
-
-OWN_STEPS = (4, 16)
-"""Moves of the reference's own canvas, in roundings of S: mirrors facing mirrors make much of little."""
-
-STARTS = (0.25, 0.5, 2.0, 4.0, 16.0)
-"""Other starts of the reference's secondary rays, as factors. The last is for rays that leave a triangle at a
-cosine of 1e-3: they may meet it once more beyond the usual start."""
-
-
-def reference_changes(
-    scene: tracer.Scene, theirs: Array, extent: float, supersample: int | None = None
-) -> Array:
-    """(h, w) by how much the color of each pixel of the reference moves with the canvas, and with the start
-    of its secondary rays."""
-
-    def color(canvas: tracer.Scene) -> Array:
-        return whitted.render(canvas, supersample).color
-
-    change = largest_change(color, theirs, scene, extent, OWN_STEPS)
-    for factor in STARTS:
-        other = whitted.render(scene, supersample, start=factor * START).color
-        change = np.maximum(change, np.abs(other - theirs).max(axis=2))
-    return change
 
 
 def compare_with_mitsuba(case: Case) -> Outcome:
     """Every color of ours against the document's formula on Mitsuba's hits, visibility and directions."""
     ours, theirs, rays = render_of(case).result, their_picture(case), render_of(case).rays
-    apart = np.abs(ours.color - theirs.color).max(axis=2)
+    apart = distance(ours.color, ours.depth, theirs.color, theirs.depth)
     differs = apart > TOLERANCES["color, Mitsuba"].value
-    differs |= (ours.depth < 0) != (theirs.depth < 0)
     excused = excuses(case, differs, apart)
     order = np.concatenate([np.flatnonzero(differs & ~excused), np.flatnonzero(excused)])[:LISTED]
     outside = order[~excused.flat[order]]
@@ -72,7 +40,7 @@ def compare_with_mitsuba(case: Case) -> Outcome:
         return replay(case, rays, k, answers, bool(excused.flat[k]))
 
     found = compare_pictures(ours.color, theirs.color)
-    kept, distance = samples(case, rays, np.arange(apart.size), worst)
+    kept, silhouette = samples(case, rays, np.arange(apart.size), worst)
     return Outcome(
         term="picture, Mitsuba",
         scene=case.scene.name,
@@ -87,7 +55,7 @@ def compare_with_mitsuba(case: Case) -> Outcome:
         guilty=guilty,
         worst=at(worst),
         samples=apart.ravel()[kept],
-        distance_to_silhouette=distance,
+        distance_to_silhouette=silhouette,
         differing=tuple(at(int(k)) for k in order),
         panels=Panels("color", ours.color, theirs.color, differs),
         figures={
@@ -99,15 +67,16 @@ def compare_with_mitsuba(case: Case) -> Outcome:
 
 
 def excuses(case: Case, differs: Array, apart: Array) -> Array:
-    """(h, w) which of the pixels that differ may: their colors move at least half as far where rounding
-    decides; or what they see is seen edge on, as at the horizon of a plane, and the reference's next ray may
-    meet it again."""
+    """(h, w) which of the pixels that differ may: the reference's own colors move at least half as far; or
+    what they show is seen edge on, as at the horizon of a plane."""
     if not differs.any():
         return differs
-    moves = changes(case) >= apart / 2
+    if "doubt" not in case.bench.memory:
+        case.bench.memory["doubt"] = doubt(case.bench.small, case.bench.mitsuba.extent, 1)
+    moves = case.bench.memory["doubt"] >= apart / 2
     k = np.flatnonzero(differs)
     edge_on = np.zeros(differs.size, bool)
-    edge_on[k] = cosine_of_arrival(case, k) < EDGE_ON
+    edge_on[k] = cosine_of_arrival(case, k) < TOLERANCES["edge on"].value
     return np.asarray(differs & (moves | edge_on.reshape(differs.shape)))
 
 
@@ -131,20 +100,6 @@ def their_picture(case: Case) -> whitted.Picture:
         memory["whitted"] = whitted.render(case.bench.small, supersample=1)
     picture: whitted.Picture = memory["whitted"]
     return picture
-
-
-def changes(case: Case) -> Array:
-    """(h, w) the larger of both changes of color, made once a scene; in double precision also how far our
-    color in single precision is: the model's small value for borders of texture cells depends on it."""
-    memory, scene, extent = case.bench.memory, case.bench.small, case.bench.mitsuba.extent
-    if "changes" not in memory:
-        theirs = reference_changes(scene, their_picture(case).color, extent, 1)
-        memory["changes"] = np.maximum(canvas_changes(scene, extent, 1), theirs)
-    found: Array = memory["changes"]
-    if case.precision == "double":
-        single = render_of(case.in_precision("single")).result.color
-        found = np.maximum(found, np.abs(render_of(case).result.color - single).max(axis=2))
-    return found
 
 
 def second_opinion(case: Case, pixels: Array) -> tuple[Guilty, dict[int, str]]:

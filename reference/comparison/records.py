@@ -141,7 +141,9 @@ class Outcome:
 
     @property
     def verdict(self) -> str:
-        """`passed` or `failed`."""
+        """`passed`, `failed`, or `no rays` where nothing was met that could be compared."""
+        if self.passed and not self.rays:
+            return "no rays"
         return "passed" if self.passed else "failed"
 
     def to_dict(self) -> dict[str, Any]:

@@ -63,3 +63,9 @@ def pixel_centers(case: Case, scene: tracer.Scene) -> RaySet:
     o, d = extended.camera_rays(scene.camera, pixel[:, 0] + offset, pixel[:, 1] + offset)
     same = scene.camera.resolution == case.scene.camera.resolution
     return RaySet(extended.double(o), extended.double(d), pixel if same else np.full_like(pixel, -1))
+
+
+def distance(color: Array, depth: Array, other: Array, other_depth: Array) -> Array:
+    """(h, w) the largest difference of a channel; infinite where one picture is blank and the other not."""
+    apart = np.abs(color - other).max(axis=2)
+    return np.where((depth < 0) != (other_depth < 0), np.inf, apart)

@@ -13,14 +13,14 @@ import numpy as np
 import tracer
 from reference import extended
 from reference.comparison import optics
-from reference.comparison.case import Case, sizes
+from reference.comparison.case import Case
 from reference.comparison.rays import RaySet, single
 from reference.comparison.steps import step_length
-from reference.comparison.truth import MESH, PLANE, material_of
+from reference.comparison.truth import material_of
 from reference.comparison.visibility import exact_visibility
-from reference.mitsuba_scene import SHADOW_START
 from reference.tolerances import EPSILON
 from tracer.errors import UsageError
+from tracer.queries import END_GUARD
 
 Array = np.ndarray
 
@@ -32,9 +32,6 @@ DEEPEST = 8
 
 MOST = 32
 """Vertices that are shown, at most."""
-
-STARTING = 1e-9
-"""What a ray leaves is met again at its start, up to this share of S."""
 
 CUTOFF_SLACK = 1e-6
 """The model's: a product of shares that meets the cut-off in decimals is traced."""
@@ -186,16 +183,10 @@ def _mitsuba_side(case: Case, o: Array, d: Array, v: int) -> Side:
 def _exact_side(case: Case, o: Array, d: Array, left: tuple[int, int]) -> Side:
     """Closed forms: the nearest crossing that is not the start of the ray."""
     truth, way = case.bench.truth, extended.unit(d[None])
-    start = STARTING * sizes(truth, o[None])[0]
-    found = []
-    for t, shape, primitive in truth.crossings(o[None], way):
-        is_start = shape == left[0] and (truth.kind[shape] == PLANE or t[0] < start)
-        is_start |= truth.kind[shape] == MESH and (shape, primitive[0]) == left
-        if np.isfinite(t[0]) and t[0] > 0 and not is_start:
-            found.append((float(t[0]), shape, int(primitive[0])))
-    if not found:
+    shapes, primitives, t = truth.nearest(o[None], d[None], (np.array([left[0]]), np.array([left[1]])))
+    number, which, distance = int(shapes[0]), int(primitives[0]), float(t[0])
+    if number < 0:
         return NOBODY
-    distance, number, which = min(found)
     numbers = np.array([number]), np.array([which])
     p = extended.number(o[None]) + extended.number(distance) * way
     normal, entering, _ = truth.shading(p, way, *numbers)
@@ -226,5 +217,5 @@ def _seen(case: Case, at: Array, name: str) -> list[int]:
     elif name == "Mitsuba":
         seen = case.bench.mitsuba.visible(p, light)
     else:
-        seen = exact_visibility(truth, p, light, SHADOW_START * case.bench.mitsuba.extent)
+        seen = exact_visibility(truth, p, light, END_GUARD["double"] * case.bench.mitsuba.extent)
     return [int(part.sum()) for part in np.split(seen, truth.first_light[1:-1])]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import tracer
+from reference.comparison.decisions import ELSEWHERE
 from reference.comparison.replay import DEEPEST, MOST, SIDES, Side, Vertex
 from tracer.lights import AreaLight
 
@@ -52,6 +53,9 @@ def _remarks(sides: list[Side]) -> list[str]:
     found = []
     if len({(side.shape, side.primitive) for side in sides}) > 1:
         found.append("  the sides hit different things")
+    longest = max(side.t for side in sides if side.shape >= 0)
+    if any(longest - side.t > ELSEWHERE * longest for side in sides if side.shape >= 0):
+        found.append("  the sides hit the same thing at different places")
     if len({tuple(side.seen) for side in sides}) > 1:
         found.append("  the sides see different lights")
     return found

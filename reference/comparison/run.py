@@ -14,6 +14,7 @@ from reference.comparison import (
     hits,
     lockstep,
     pictures,
+    placements,
     second_version,
     total_reflection,
     visibility,
@@ -29,7 +30,7 @@ Progress = Callable[[int, int, Outcome], None]
 
 def terms() -> list[Term]:
     """All terms, in the order of a report."""
-    geometry = (cameras, depths, hits, visibility, lockstep, directions, total_reflection, chains)
+    geometry = (placements, cameras, depths, hits, visibility, lockstep, directions, total_reflection, chains)
     rooms = (*geometry, pictures, second_version, backends)
     return [term for room in rooms for term in room.terms()]
 
@@ -55,7 +56,8 @@ def run(
     """The outcomes of the terms that apply, scene by scene and precision by precision. A `Subject` says how a
     replay names its scene, else the scene's name does.
 
-    Raises `MachineError` without Mitsuba, `SceneError` for a scene that cannot be compiled.
+    Raises `MachineError` without Mitsuba, `SceneError` for a scene that cannot be compiled, `UsageError`
+    where no term applies.
     """
     subjects = [scene if isinstance(scene, Subject) else Subject(scene, scene.name) for scene in scenes]
     work = [
@@ -64,6 +66,8 @@ def run(
         for precision in precisions
     ]
     total = sum(len(applicable) for *_, applicable in work)
+    if not total:
+        raise UsageError("there is nothing to compare: no term applies to a scene that is named")
     outcomes: list[Outcome] = []
     case: Case | None = None
     for subject, precision, applicable in work:

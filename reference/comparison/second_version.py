@@ -12,14 +12,15 @@ import numpy as np
 
 import tracer
 from reference import plain
-from reference.comparison.canvas_moves import canvas_changes
 from reference.comparison.case import Case, small_picture
 from reference.comparison.decisions import LISTED
+from reference.comparison.doubt import doubt
 from reference.comparison.judge import replay, share_of
 from reference.comparison.kinds import has_shapes
 from reference.comparison.records import Outcome, Replay, Term
-from reference.comparison.renders import pixel_centers
+from reference.comparison.renders import distance, pixel_centers
 from reference.tolerances import TOLERANCES
+from reference.whitted_tables import plain_world
 
 Array = np.ndarray
 
@@ -30,15 +31,6 @@ TRIANGLES_A_PIXEL = 40
 """So many triangles cost the plain version as much as all else of a pixel."""
 
 COUNTED = ("total_internal", "ended_by_cutoff", "ended_by_depth", "deepest_level")
-
-
-def plain_world(scene: tracer.Scene) -> plain.World:
-    """The scene as the plain version reads it, its files where they lie."""
-    table = scene.to_dict()
-    for entry in (*table.get("shapes", []), *table.get("textures", {}).values()):
-        if "file" in entry:
-            entry["file"] = str(scene.resolve(entry["file"]))
-    return plain.load(table, scene.base_dir)
 
 
 def plain_colors(scene: tracer.Scene, pixels: Array) -> Array:
@@ -74,15 +66,15 @@ def versions(case: Case) -> Versions:
 
 
 def compare_colors(case: Case) -> Outcome:
-    """Every color of ours against the plain version's. In single precision pixels may differ whose color in
-    double precision moves with the rounding of the canvas."""
+    """Every color of ours against the plain version's. In single precision pixels may differ that rounding
+    decides."""
     v = versions(case)
     row = TOLERANCES[f"color, {case.precision}"]
-    apart = np.abs(v.ours.color - v.theirs.color).max(axis=2)
-    differs = (apart > row.value) | ((v.ours.depth < 0) != (v.theirs.depth < 0))
+    apart = distance(v.ours.color, v.ours.depth, v.theirs.color, v.theirs.depth)
+    differs = apart > row.value
     excused = np.zeros_like(differs)
     if differs.any() and case.precision == "single":
-        excused = differs & (canvas_changes(v.scene, case.bench.mitsuba.extent, 1) >= apart / 2)
+        excused = differs & (doubt(v.scene, case.bench.mitsuba.extent, 1) >= apart / 2)
     rays = pixel_centers(case, v.scene)
     order = np.flatnonzero(differs)
     order = order[np.argsort(excused.ravel()[order], kind="stable")]

@@ -27,11 +27,11 @@ CHAINS = ("RRRRRRRR", "TTTTTTTT", "RTRTRTRT", "TTRTTRTT")
 CHAIN_SHARE = 4
 """One ray in so many becomes a chain."""
 
-STEP = 1e-5
-"""Mitsuba's rays start so far along themselves, in extents S, so that they do not hit what they leave."""
+STEP = TOLERANCES["start step"].value
+"""Mitsuba's rays start so far along themselves, in extents S."""
 
 NEAR = 6
-"""What is hit within so many of these steps may be another thing for a ray that starts a step later."""
+"""What is hit within so many of these steps is near the start: a ray that starts a step later may miss it."""
 
 
 @dataclass(frozen=True)
@@ -47,16 +47,17 @@ class Chains:
 
 @dataclass(frozen=True)
 class Steps:
-    """All steps of all chains, one row each: our ray leaves `o` (n, 3) on the shape `left` (-1: none) in
-    direction `d` and reaches `p` on `shape`, `primitive` (NaN, -1: a miss); then comes the event `refracts`
-    or a mirror, and the chain leaves in direction `out` (NaN: total reflection, or the chain's end).
-    `origin`, `way`: what Mitsuba is asked; `theirs_p`, `theirs_shape`, `theirs_primitive`: its answer;
-    `vertex` (n,): which step of its chain; `first_o`, `first_d`, `pixel`, `events`: with what the chain
-    began."""
+    """All steps of all chains, one row each: our ray leaves `o` (n, 3) on the primitive `left_primitive` of
+    the shape `left` (-1: none) in direction `d` and reaches `p` on `shape`, `primitive` (NaN, -1: a miss);
+    then comes the event `refracts` or a mirror, and the chain leaves in direction `out` (NaN: total
+    reflection, or the chain's end). `origin`, `way`: what Mitsuba is asked; `theirs_p`, `theirs_shape`,
+    `theirs_primitive`: its answer; `vertex` (n,): which step of its chain; `first_o`, `first_d`, `pixel`,
+    `events`: with what the chain began."""
 
     o: Array
     d: Array
     left: Array
+    left_primitive: Array
     p: Array
     shape: Array
     primitive: Array
@@ -112,7 +113,7 @@ def steps(case: Case) -> Steps:
 
 def _in_lockstep(case: Case, ours: Chains) -> Steps:
     rays, path, refracts = ours.rays, ours.path, ours.refracts
-    o, d, left = rays.o, rays.d, np.full(len(rays), -1)
+    o, d, (left, left_primitive) = rays.o, rays.d, np.full((2, len(rays)), -1)
     going = np.full(len(rays), True)
     blocks: list[list[Array]] = []
     for vertex in range(refracts.shape[1]):
@@ -125,12 +126,13 @@ def _in_lockstep(case: Case, ours: Chains) -> Steps:
         out = path.direction[:, vertex]
         at_vertex = [a[k, vertex] for a in (path.position, path.shape, path.primitive)]
         blocks.append(
-            [o[k], d[k], left[k], *at_vertex, refracts[k, vertex], out[k], origin, way]
+            [o[k], d[k], left[k], left_primitive[k], *at_vertex, refracts[k, vertex], out[k], origin, way]
             + [hits.p, hits.shape, hits.primitive, np.full(len(k), vertex)]
             + [rays.o[k], rays.d[k], rays.pixel[k], ours.events[k]]
         )
         going = going & (path.count > vertex) & np.isfinite(out).all(axis=1)
-        o, d, left = path.position[:, vertex], out, path.shape[:, vertex]
+        o, d = path.position[:, vertex], out
+        left, left_primitive = path.shape[:, vertex], path.primitive[:, vertex]
     return Steps(*(np.concatenate(columns) for columns in zip(*blocks, strict=True)))
 
 
@@ -145,10 +147,10 @@ def is_near(case: Case, s: Steps, p: Array, start: Array) -> Array:
 
 
 def parted(case: Case, s: Steps) -> Array:
-    """Mask: both sides reach the same sphere, but Mitsuba's ray, which starts within rounding of it, meets it
-    again at once, while ours crosses it."""
-    again = (s.left == s.theirs_shape) & is_near(case, s, s.theirs_p, s.origin)
-    return np.asarray(again & (s.shape == s.theirs_shape) & ~is_near(case, s, s.p, s.o))
+    """Mask: both sides reach the sphere that the ray leaves, one of them again at once, as rounding may have
+    it, the other where the ray has crossed it."""
+    again = (s.left == s.shape) & (s.left == s.theirs_shape)
+    return np.asarray(again & (is_near(case, s, s.p, s.o) != is_near(case, s, s.theirs_p, s.origin)))
 
 
 def agreed_steps(case: Case) -> tuple[Steps, Array]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from reference.comparison import optics
@@ -9,13 +11,14 @@ from reference.comparison.bends import bends, total_band
 from reference.comparison.case import Case
 from reference.comparison.decisions import Decisions, judge_decisions
 from reference.comparison.judge import SINGLE
-from reference.comparison.kinds import has_glass
+from reference.comparison.kinds import glass_kinds
 from reference.comparison.records import Outcome, Term
 
 
 def compare_total_reflection(case: Case) -> Outcome:
     """Which refractions are total: ours, Mitsuba's and the sign of k."""
     b = bends(case, refracts=True)
+    left_out = int((~b.sure).sum())
     b = b.part(b.sure)
     d, _, outward = b.asked()
     _, theirs = optics.refracted(d, outward, case.bench.truth.ior[b.steps.shape])
@@ -31,9 +34,17 @@ def compare_total_reflection(case: Case) -> Outcome:
         wrong=lambda k: (ours_wrong[k], theirs_wrong[k]),
         answers=lambda k: (words[bool(ours[k])], words[bool(theirs[k])], words[bool(exact[k])]),
     )
-    return judge_decisions(case, "total reflection", decisions)
+    outcome = judge_decisions(case, "total reflection", decisions)
+    return replace(outcome, figures={"events left out": float(left_out)})
 
 
 def terms() -> list[Term]:
     """The one term."""
-    return [Term("total reflection", "where refraction is total", has_glass, compare_total_reflection)]
+    return [
+        Term(
+            "total reflection",
+            "where refraction is total",
+            lambda scene: bool(glass_kinds(scene)),
+            compare_total_reflection,
+        )
+    ]

@@ -1,7 +1,7 @@
 """The geometry of a scene for closed forms: read by `reference.plain`, answered in extended precision.
 
 Nothing here comes from the code of `tracer` that places shapes or tests rays; `tracer.Scene` only gives the
-entries of the scene file.
+entries of the scene file. What the tracer itself makes of them is compared in `placements.py`.
 """
 
 from __future__ import annotations
@@ -150,35 +150,47 @@ class Truth:
             cosine[k] = np.abs(extended.double(c))
         return facing, entering, cosine
 
-    def nearest(self, o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Shape and primitive (-1: miss) and t of the nearest hits of a few rays, every primitive asked."""
+    def nearest(
+        self, o: Any, d: Any, left: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Shape and primitive (-1: miss) and t (infinite) of the nearest hits of a few rays, every primitive
+        asked; `left`: shapes and primitives that the rays leave, -1 where none, whose start is no hit."""
         d = extended.unit(d)
         best, shape = np.full(len(o), np.inf), np.full(len(o), -1)
         primitive = np.full(len(o), -1)
-        for t, number, which in self.crossings(o, d):
+        for t, number, which in self.crossings(o, d, left):
             closer = np.isfinite(t) & (t > 0) & (t < best)
             best = np.where(closer, t, best)
             shape, primitive = np.where(closer, number, shape), np.where(closer, which, primitive)
         return shape, primitive, best
 
-    def crossings(self, o: Any, d: Any) -> list[tuple[np.ndarray, int, np.ndarray]]:
+    def crossings(
+        self, o: Any, d: Any, left: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> list[tuple[np.ndarray, int, np.ndarray]]:
         """(t, shape, primitive) for every surface: two of a sphere, the nearest positive one of a mesh; t is
-        NaN where it is not met. For a few rays: all triangles are asked."""
+        NaN where it is not met, and where it is left there. For a few rays: all triangles are asked."""
         found = []
+        none = np.full(len(o), -1)
+        leaves, triangle = (none, none) if left is None else left
         for number, kind in enumerate(self.kind):
             zeros = np.zeros(len(o), np.int64)
-            shape = np.full(len(o), number)
+            shape, here = np.full(len(o), number), leaves == number
             if kind == PLANE:
-                found.append((extended.double(self.hit(o, d, shape, zeros)[0]), number, zeros))
+                t = extended.double(self.hit(o, d, shape, zeros)[0])
+                found.append((np.where(here, np.nan, t), number, zeros))
             elif kind == SPHERE:
                 near, far, chord = extended.sphere_roots(o, d, self.rows[shape])
-                meets = np.asarray(chord >= 0)
-                found += [(np.where(meets, extended.double(t), np.nan), number, zeros) for t in (near, far)]
+                near, far = (np.where(chord >= 0, extended.double(t), np.nan) for t in (near, far))
+                starts_near = np.abs(near) <= np.abs(far)
+                found.append((np.where(here & starts_near, np.nan, near), number, zeros))
+                found.append((np.where(here & ~starts_near, np.nan, far), number, zeros))
             else:
-                found.append(self._mesh_crossing(o, d, number))
+                found.append(self._mesh_crossing(o, d, number, np.where(here, triangle, -1)))
         return found
 
-    def _mesh_crossing(self, o: Any, d: Any, number: int) -> tuple[np.ndarray, int, np.ndarray]:
+    def _mesh_crossing(
+        self, o: Any, d: Any, number: int, left: np.ndarray
+    ) -> tuple[np.ndarray, int, np.ndarray]:
         corners = self.corners[self.first[number] : self.first[number + 1]]
         usable = self.usable[self.first[number] : self.first[number + 1]]
         t, primitive = np.full(len(o), np.nan), np.zeros(len(o), np.int64)
@@ -187,7 +199,8 @@ class Truth:
             with np.errstate(invalid="ignore", divide="ignore"):
                 there, _ = extended.triangle_hit(origin, way, corners)
                 met = extended.inside_triangle(origin + there[:, None] * way, corners)
-            there = np.where(met & usable & (extended.double(there) > 0), extended.double(there), np.inf)
+            met &= usable & (np.arange(len(corners)) != left[k])
+            there = np.where(met & (extended.double(there) > 0), extended.double(there), np.inf)
             primitive[k] = int(np.argmin(there))
             t[k] = there[primitive[k]] if np.isfinite(there[primitive[k]]) else np.nan
         return t, number, primitive

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 import tracer
@@ -15,14 +17,24 @@ from reference.comparison.records import Outcome, Term
 from reference.comparison.truth import Truth
 from reference.mitsuba_scene import SHADOW_START
 from reference.tolerances import TOLERANCES
+from tracer.queries import END_GUARD
 
 Array = np.ndarray
 
-FARTHEST = 4.0
+FARTHEST = TOLERANCES["far points"].value
 """Points are at most so many extents S from the origin along an axis."""
 
-OUR_GUARD = 1e-4
-"""Our guard in double precision, as a share of Mitsuba's."""
+
+@dataclass(frozen=True)
+class WayRays(RaySet):
+    """Ways from points to lights: `first`, the rays that reached the points; a replay shows those, and which
+    lights are seen from where they end."""
+
+    first: RaySet
+
+    def options(self, k: int) -> str:
+        """The options that show the point again."""
+        return self.first.options(k)
 
 
 def has_lights(scene: tracer.Scene) -> bool:
@@ -30,9 +42,10 @@ def has_lights(scene: tracer.Scene) -> bool:
     return bool(scene.shapes and scene.lights)
 
 
-def ways(case: Case) -> tuple[RaySet, Array]:
+def ways(case: Case) -> tuple[WayRays, Array, int]:
     """From each of our hit points to every light, one of its samples (n, 3): the ways as rays of unit
-    direction. Points far away are left out: both sides scale their guards by the farthest one."""
+    direction; and how many are left out, since a point is far away, where both sides scale their guards by
+    it, or too close to the light."""
     rays, ours, truth = case.bench.rays, case.ours, case.bench.truth
     rng = np.random.default_rng([case.seed, 2])
     near = np.abs(np.nan_to_num(ours.position)).max(axis=1) <= FARTHEST * case.bench.mitsuba.extent
@@ -42,37 +55,41 @@ def ways(case: Case) -> tuple[RaySet, Array]:
     sample = truth.first_light[number] + rng.integers(counts[number])
     p, light = ours.position[k].astype(np.float64), single(truth.lights)[sample]
     length = np.linalg.norm(light - p, axis=1)
-    apart = length > 10 * SHADOW_START * FARTHEST * case.bench.mitsuba.extent
-    d = (light - p)[apart] / length[apart, None]
-    return RaySet(p[apart], d, rays.pixel[k][apart]), light[apart]
+    apart = np.flatnonzero(length > 10 * SHADOW_START * FARTHEST * case.bench.mitsuba.extent)
+    k, p, light, d = k[apart], p[apart], light[apart], ((light - p) / length[:, None])[apart]
+    left_out = int(ours.valid.sum()) * len(counts) - len(k)
+    return WayRays(p, d, rays.pixel[k], rays.part(k)), light, left_out
 
 
 def compare_visibility(case: Case) -> Outcome:
-    """Whether a light is seen. Both sides leave out what is next to the ends, Mitsuba's guard being the
+    """Whether a light is seen. Each side leaves out what is next to the ends, Mitsuba's guard being the
     wider: blockers there, and ways that run within the band of a silhouette, an edge or, past the guard, of a
     surface, may be counted otherwise."""
-    truth = case.bench.truth
-    rays, light = ways(case)
-    ours = tracer.visible(case.bench.scene, rays.o, light, precision=case.precision, backend=case.backend)
+    truth, scene = case.bench.truth, case.bench.scene
+    rays, light, left_out = ways(case)
+    ours = tracer.visible(scene, rays.o, light, precision=case.precision, backend=case.backend)
     theirs = case.bench.mitsuba.visible(rays.o, light)
-    farthest = max(np.abs(x).max(initial=0) for x in (rays.o, light))
-    guard = SHADOW_START * max(case.bench.mitsuba.extent, farthest)
+    farthest = max([case.bench.mitsuba.extent, *(np.abs(x).max(initial=0) for x in (rays.o, light))])
+    guard, own_guard = SHADOW_START * farthest, END_GUARD[case.precision] * farthest
 
     def in_band(k: Array) -> Array:
         band = TOLERANCES["grazing band"].value * SINGLE * sizes(truth, rays.o[k], light[k])
         return border_distance(truth, rays.o[k], light[k], guard) <= band
 
     def wrong(k: Array) -> tuple[Array, Array]:
-        seen = exact_visibility(truth, rays.o[k], light[k], guard)
-        return ours[k] != seen, theirs[k] != seen
+        seen = (exact_visibility(truth, rays.o[k], light[k], width) for width in (own_guard, guard))
+        own, other = seen
+        return ours[k] != own, theirs[k] != other
 
     def answers(k: int) -> Sides:
-        (exact,) = exact_visibility(truth, rays.o[k : k + 1], light[k : k + 1], guard)
+        one = slice(k, k + 1)
+        (exact,) = exact_visibility(truth, rays.o[one], light[one], END_GUARD["double"] * farthest)
         where = f"the light at {light[k].tolist()}"
         said = ("sees" if seen else "does not see" for seen in (ours[k], theirs[k], exact))
         return tuple(f"{verb} {where}" for verb in said)  # type: ignore[return-value]
 
-    return judge_decisions(case, "visibility", Decisions(rays, ours != theirs, in_band, wrong, answers))
+    outcome = judge_decisions(case, "visibility", Decisions(rays, ours != theirs, in_band, wrong, answers))
+    return replace(outcome, figures={"ways left out": float(left_out)})
 
 
 def border_distance(truth: Truth, p: Array, light: Array, guard: float) -> Array:
@@ -86,7 +103,7 @@ def border_distance(truth: Truth, p: Array, light: Array, guard: float) -> Array
     for end in (p + guard * d, light - guard * d):
         distance = np.minimum(distance, grazing.start_distance(truth, end))
     only_in_guards = exact_visibility(truth, p, light, guard) & ~exact_visibility(
-        truth, p, light, guard * OUR_GUARD
+        truth, p, light, guard * END_GUARD["double"] / SHADOW_START
     )
     return np.where(only_in_guards, 0, distance)
 

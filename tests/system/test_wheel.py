@@ -74,6 +74,7 @@ def test_the_wheel_holds_scenes_and_assets_and_no_leftovers(wheel: Path, reposit
         files = [file for file in (repository / folder).glob("*.*") if file.is_file()]
         assert {f"tracer/data/{folder}/{file.name}" for file in files} <= names
     assert {"tracer/py.typed", "tracer/cli/classic.py", "reference/plain.py"} <= names
+    assert "reference/report/templates/page.html.j2" in names
     assert not [name for name in names if "__pycache__" in name or name.endswith((".pyc", ".partial.png"))]
     assert not [name for name in names if name.split("/")[0] in ("tests", "benchmarks", "scripts", "docs")]
     assert all(name.split("/")[0] in ("tracer", "reference") or ".dist-info/" in name for name in names)
@@ -104,6 +105,15 @@ def test_it_lists_the_scenes_under_both_names(programs: Path, tmp_path: Path) ->
     for name in ("tracer", "whitted-tracer"):
         listed = call_well([str(programs / name), "scenes"], tmp_path)
         assert [line.split()[0] for line in listed.splitlines()] == list(builtin_scenes())
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("arguments", [["validate"], ["export", "room", "--to", "mitsuba"]])
+def test_what_needs_mitsuba_says_how_to_get_it(programs: Path, tmp_path: Path, arguments: list[str]) -> None:
+    done = call([str(programs / "tracer"), *arguments], tmp_path)
+    assert done.returncode == 3 and done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("tracer: error: Mitsuba is not installed; `pip install whitted-tracer[reference]`")
     assert list(tmp_path.iterdir()) == []
 
 

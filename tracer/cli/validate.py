@@ -169,9 +169,11 @@ def tell(outcomes: list[Outcome], written: list[str], quiet: bool) -> int:
     for failure in failures:
         click.echo(f"failed: {failure}")
     if not quiet:
-        scenes, rays = len({outcome.scene for outcome in outcomes}), sum(outcome.rays for outcome in outcomes)
-        verdict = f"{len(failures)} of {len(outcomes)} failed" if failures else f"all {len(outcomes)} passed"
-        click.echo(f"{verdict}: {scenes} scenes, {rays:,} comparisons of a ray")
+        met = [outcome for outcome in outcomes if outcome.rays]
+        verdict = f"{len(failures)} of {len(met)} failed" if failures else f"all {len(met)} passed"
+        scenes, rays = len({outcome.scene for outcome in met}), sum(outcome.rays for outcome in met)
+        empty = f"; {len(outcomes) - len(met)} met no ray" if len(met) < len(outcomes) else ""
+        click.echo(f"{verdict}: {scenes} scenes, {rays:,} comparisons of a ray{empty}")
         click.echo(", ".join(written))
     return 1 if failures else 0
 
