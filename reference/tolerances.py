@@ -107,6 +107,19 @@ TOLERANCES: dict[str, Tolerance] = {
         "precision of the tables, vertices to single precision, where neighbors may round apart",
         "5, 4",
     ),
+    "direct light": Tolerance(
+        32,
+        "eps (1 + S / d)",
+        "D = sum w V (n.l), of the same points and normals: l is known to eps S / d, d the distance of the "
+        "nearest sample; w are rounded once, and add up to 1",
+        "2",
+    ),
+    "lit points": Tolerance(
+        0.005,
+        "share",
+        "points that differ by samples in the grazing band: each has up to 64 of them",
+        "measured",
+    ),
     "canvas moves": Tolerance(
         504,
         "eps S",

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 import tracer
-from reference.comparison.case import Case
+from reference import extended, mitsuba_scene
+from reference.comparison.case import PIXELS, Case, small_picture
 from reference.comparison.judge import SINGLE, Numbers, bounds, judge_numbers
+from reference.comparison.rays import RaySet
 from reference.comparison.records import Outcome, Term
-from reference.comparison.renders import grid, pixel_centers, small_mitsuba
+from reference.comparison.renders import grid
 from tracer.backends import exact_arithmetic, find_backend
 from tracer.canvas import Canvas, DeviceCanvas
 from tracer.whitted import PixelGrid, primary_ray
@@ -16,24 +18,40 @@ from tracer.whitted import PixelGrid, primary_ray
 Array = np.ndarray
 
 
-def our_rays(case: Case, scene: tracer.Scene, pixel: Array) -> tuple[Array, Array]:
-    """Origins and directions (n, 3) of the renderer's primary rays through pixels."""
+def our_rays(case: Case, scene: tracer.Scene, pixel: Array, sub_ray: Array) -> tuple[Array, Array]:
+    """Origins and directions (n, 3) of the renderer's primary rays, one sub-ray of each pixel."""
     types = find_backend(case.backend, case.precision)
-    column, row = (types.UInt32(np.ascontiguousarray(c, np.uint32)) for c in pixel.T)
+    column, row, number = (types.UInt32(np.ascontiguousarray(c, np.uint32)) for c in (*pixel.T, sub_ray))
     with exact_arithmetic():
         canvas = DeviceCanvas.of(types, Canvas.of(scene.camera, scene.literal))
-        pixels = PixelGrid(column, row, types.UInt32(0), types.opaque_id(1), types.Bool(True))
-        o, d = primary_ray(types, canvas, pixels, types.UInt32(0))
+        n = types.opaque_id(scene.camera.supersample)
+        pixels = PixelGrid(column, row, types.UInt32(0), n, types.Bool(True))
+        o, d = primary_ray(types, canvas, pixels, number)
         return o.numpy().T.astype(np.float64), d.numpy().T.astype(np.float64)
 
 
+def true_rays(case: Case, scene: tracer.Scene, pixel: Array, sub_ray: Array) -> RaySet:
+    """The same from the numbers of the scene file, in extended precision rounded once to doubles."""
+    n, offset = scene.camera.supersample, extended.pixel_offset(scene.camera, scene.literal)
+    a, b = sub_ray % n, sub_ray // n
+    o, d = extended.camera_rays(scene.camera, pixel[:, 0] + (a + offset) / n, pixel[:, 1] + (b + offset) / n)
+    named = scene.camera.resolution == case.scene.camera.resolution and n == 1
+    return RaySet(extended.double(o), extended.double(d), pixel if named else np.full_like(pixel, -1))
+
+
 def compare_camera(case: Case) -> Outcome:
-    """Origins in eps S, S the largest |coordinate| of canvas and eye, and directions in eps: the larger of
-    the two errors of each ray."""
-    scene = case.bench.small
-    pixel, rays = grid(scene), pixel_centers(case, scene)
+    """Of every pixel one of its n x n sub-rays: origins in eps S, S the largest |coordinate| of canvas and
+    eye, and directions in eps: the larger of the two errors of each ray."""
+    n = case.scene.camera.supersample
+    scene = small_picture(case.bench.scene, max(1, min(case.rays, PIXELS) // n**2))
+    scene = scene.model_copy(update={"shapes": []})
+    pixel = grid(scene)
+    sub_ray = np.random.default_rng([case.seed, 4]).integers(n**2, size=len(pixel))
+    rays, ours = true_rays(case, scene, pixel, sub_ray), our_rays(case, scene, pixel, sub_ray)
     o, d = rays.o, rays.d
-    theirs, ours = small_mitsuba(case).camera_rays(), our_rays(case, scene, pixel)
+    chosen = np.arange(len(pixel)) * n**2 + sub_ray
+    their_o, their_d = (v[chosen] for v in mitsuba_scene.build(scene, supersample=n).camera_rays())
+    theirs = their_o, their_d
     eye = o - scene.camera.eye_distance * d
     extent = max(float(np.abs(o).max()), float(np.abs(eye).max()))
 

@@ -43,6 +43,22 @@ class RaySet:
 
 
 @dataclass(frozen=True)
+class PictureRays(RaySet):
+    """Rays of the pixels of a picture of another size than the scene's: `settings`, the options that give the
+    scene that size."""
+
+    settings: str
+
+    def part(self, k: Array) -> PictureRays:
+        """Some of the rays, by number or mask."""
+        return PictureRays(self.o[k], self.d[k], self.pixel[k], self.settings)
+
+    def options(self, k: int) -> str:
+        """The options that show a pixel again."""
+        return f"{self.settings} {super().options(k)}"
+
+
+@dataclass(frozen=True)
 class StepRays(RaySet):
     """Rays that are steps of chains: `first`: the rays that the chains began with, `events` (n,): the letters
     of each chain."""

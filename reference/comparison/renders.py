@@ -9,7 +9,7 @@ import numpy as np
 import tracer
 from reference import extended, mitsuba_scene
 from reference.comparison.case import Case
-from reference.comparison.rays import RaySet
+from reference.comparison.rays import PictureRays, RaySet
 
 Array = np.ndarray
 
@@ -57,12 +57,20 @@ def grid(scene: tracer.Scene) -> Array:
 
 def pixel_centers(case: Case, scene: tracer.Scene) -> RaySet:
     """The rays of all pixels of a small picture, from the numbers of the scene file, in extended precision
-    rounded once to doubles. Where it is smaller than the scene's own, its pixels have no name there."""
-    pixel = grid(scene)
-    offset = extended.pixel_offset(scene.camera, scene.literal)
-    o, d = extended.camera_rays(scene.camera, pixel[:, 0] + offset, pixel[:, 1] + offset)
-    same = scene.camera.resolution == case.scene.camera.resolution
-    return RaySet(extended.double(o), extended.double(d), pixel if same else np.full_like(pixel, -1))
+    rounded once to doubles."""
+    pixel, camera = grid(scene), scene.camera
+    offset = extended.pixel_offset(camera, scene.literal)
+    o, d = (
+        extended.double(v) for v in extended.camera_rays(camera, pixel[:, 0] + offset, pixel[:, 1] + offset)
+    )
+    if camera.resolution == case.scene.camera.resolution:
+        return RaySet(o, d, pixel)
+    if case.words.startswith("--random"):  # takes no settings: the ray itself has to do
+        return RaySet(o, d, np.full_like(pixel, -1))
+    settings = f"--set camera.resolution=[{camera.resolution[0]},{camera.resolution[1]}]"
+    if not camera.is_look_at:
+        settings += f" --set camera.pixel_size={camera.pixel_size!r}"
+    return PictureRays(o, d, pixel, settings)
 
 
 def distance(color: Array, depth: Array, other: Array, other_depth: Array) -> Array:

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 import tracer
-from reference import extended
+from reference import extended, plain, whitted
 from reference.comparison import optics
 from reference.comparison.case import Case
 from reference.comparison.rays import RaySet, single
@@ -19,6 +20,7 @@ from reference.comparison.steps import step_length
 from reference.comparison.truth import material_of
 from reference.comparison.visibility import exact_visibility
 from reference.tolerances import EPSILON
+from reference.whitted_tables import plain_world
 from tracer.errors import UsageError
 from tracer.queries import END_GUARD
 
@@ -78,6 +80,19 @@ def pixel_ray(case: Case, column: int, row: int) -> RaySet:
     offset = extended.pixel_offset(case.scene.camera, case.scene.literal)
     o, d = extended.camera_rays(case.bench.scene.camera, [column + offset], [row + offset])
     return RaySet(single(extended.double(o)), single(extended.double(d)), np.array([[column, row]]))
+
+
+def pixel_colors(case: Case, column: int, row: int) -> list[list[float]]:
+    """The color of a pixel by all sides, with one ray through its center: ours in both precisions, on
+    Mitsuba's hits, and by the plain version, which has double precision."""
+    camera = case.scene.camera.model_copy(update={"depth_of_field": None})
+    scene, crop = case.scene.model_copy(update={"camera": camera}), (column, row, column + 1, row + 1)
+    pictures: list[Any] = [
+        tracer.render(scene, precision, case.backend, supersample=1, crop=crop) for precision in OURS.values()
+    ]
+    pictures.append(whitted.render(scene, 1, crop))
+    pictures.append(plain.render(plain_world(scene), supersample=1, crop=crop))
+    return [[float(x) for x in picture.color[0, 0]] for picture in pictures]
 
 
 def free_ray(numbers: Sequence[float]) -> RaySet:

@@ -25,6 +25,14 @@ def replay_text(scene: tracer.Scene, vertices: list[Vertex], origin: list[float]
     return "\n\n".join(blocks)
 
 
+def color_text(colors: list[list[float]]) -> str:
+    """The color of a pixel by all sides; the plain version stands in for extended precision."""
+    lines = ["color of the pixel, one ray", _line("", [*SIDES[:-1], "plain version"])]
+    for channel, name in enumerate(("red", "green", "blue")):
+        lines.append(_line(name, [_number(color[channel]) for color in colors]))
+    return "\n".join(lines)
+
+
 def _block(scene: tracer.Scene, vertex: Vertex, reached: set[str]) -> str:
     """One vertex; of its directions those that lead to another one."""
     way = ", then ".join(LETTERS[letter] for letter in vertex.events) or "the first"

@@ -10,6 +10,7 @@ from reference.comparison import (
     cameras,
     chains,
     depths,
+    direct_lights,
     directions,
     hits,
     lockstep,
@@ -30,7 +31,18 @@ Progress = Callable[[int, int, Outcome], None]
 
 def terms() -> list[Term]:
     """All terms, in the order of a report."""
-    geometry = (placements, cameras, depths, hits, visibility, lockstep, directions, total_reflection, chains)
+    geometry = (
+        placements,
+        cameras,
+        depths,
+        hits,
+        visibility,
+        direct_lights,
+        lockstep,
+        directions,
+        total_reflection,
+        chains,
+    )
     rooms = (*geometry, pictures, second_version, backends)
     return [term for room in rooms for term in room.terms()]
 
@@ -40,7 +52,7 @@ def find_terms(names: Sequence[str]) -> list[Term]:
     known = {term.name: term for term in terms()}
     wrong = [name for name in names if name not in known]
     if wrong:
-        raise UsageError(f"term: {wrong[0]!r} is unknown; allowed are {', '.join(known)}")
+        raise UsageError(f"term: {wrong[0]!r} is unknown; allowed are {'; '.join(known)}")
     return [known[name] for name in names]
 
 

@@ -128,7 +128,7 @@ def test_a_failure_says_which_ray_both_answers_and_how_to_replay_it() -> None:
 
 
 def test_an_unknown_term_is_named() -> None:
-    with pytest.raises(UsageError, match="term: 'hit' is unknown; allowed are camera rays, "):
+    with pytest.raises(UsageError, match="term: 'hit' is unknown; allowed are placement; camera rays; "):
         find_terms(["hit"])
 
 

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import tracer
-from reference.comparison import Outcome, find_terms, run
+from reference import mitsuba_scene
+from reference.comparison import Outcome, cameras, find_terms, run
 from reference.mitsuba_scene import MitsubaScene
 from reference.random_scenes import random_scene
 from tracer import canvas as canvas_module
@@ -167,6 +168,67 @@ def cutoff_doubled(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(module, "compile_scene", coarse)
 
 
+def spheres_without_shadow(patch: pytest.MonkeyPatch) -> None:
+    """In the renderer alone; `tracer.visible` goes another way."""
+    patch.setattr(SphereSlot, "blocks", lambda slot, segment, *rest: dr.full(type(segment.length > 0), False))
+
+
+def position_moved_along_the_surface(patch: pytest.MonkeyPatch) -> None:
+    """By 1e-5 S, in its plane."""
+    true = queries._hits
+
+    def moved(device: Any, hit: Any, surface: Any) -> tracer.Hits:
+        hits = true(device, hit, surface)
+        side = np.cross(hits.normal, [0.3, 0.5, 0.8])
+        return replace(hits, position=hits.position + 1e-7 * side)
+
+    patch.setattr(queries, "_hits", moved)
+
+
+def placement_ignored(patch: pytest.MonkeyPatch) -> None:
+    """Spheres stay where they were before they were scaled and moved: for all who ask the record."""
+    patch.setattr(Sphere, "placed_coefficients", lambda sphere: np.array([*sphere.center, sphere.radius]))
+
+
+def triangle_lost_for_all(patch: pytest.MonkeyPatch) -> None:
+    """For Mitsuba as well, which gets the same placed meshes."""
+    triangle_dropped(patch)
+    patch.setattr(mitsuba_scene, "placed_meshes", device_scene.placed_meshes)
+
+
+def sphere_met_again_from_inside(patch: pytest.MonkeyPatch) -> None:
+    """A share of the rays inside a sphere meets it again at once."""
+    true = SphereSlot.hit
+
+    def again(slot: SphereSlot, ray: Ray) -> tuple[Any, Any]:
+        t, valid = true(slot, ray)
+        x = ray.o.x * 1e5
+        own = ray.leaves(slot.primitive) & ray.inside & (x - dr.floor(x) < 0.02)
+        return dr.select(own, 1e-7 * slot.radius, t), valid
+
+    patch.setattr(SphereSlot, "hit", again)
+
+
+def bent_by_index_1(patch: pytest.MonkeyPatch) -> None:
+    true = queries.refract_direction
+
+    def bent(d: Any, n: Any, ior: Any, entering: Any) -> tuple[Any, Any]:
+        way, total = true(d, n, ior, entering)
+        return dr.select(ior == 1, way + 1e-6 * n, way), total
+
+    patch.setattr(queries, "refract_direction", bent)
+
+
+def sub_rays_off(patch: pytest.MonkeyPatch) -> None:
+    """All sub-rays of a pixel go through its center."""
+    true = cameras.primary_ray
+
+    def centered(types: Any, canvas: Any, pixels: Any, sub_ray: Any) -> tuple[Any, Any]:
+        return true(types, canvas, replace(pixels, n=types.opaque_id(1)), sub_ray * 0)
+
+    patch.setattr(cameras, "primary_ray", centered)
+
+
 def mitsuba_hits_too_far(patch: pytest.MonkeyPatch) -> None:
     """An error of the other side: its distances are 1e-4 too long."""
     true = MitsubaScene.intersect
@@ -213,16 +275,37 @@ CATCHES: list[tuple[Plant, str, str, str]] = [
     (light_weights_not_normalized, "picture, plain", "double", "ours"),
     (absorbed_share_is_one, "picture, Mitsuba", "single", "ours"),
     (cutoff_doubled, "rays counted, plain", "double", "ours"),
+    (spheres_without_shadow, "direct light", "double", "ours"),
+    (spheres_without_shadow, "direct light", "single", "ours"),
+    (position_moved_along_the_surface, "position, plane", "double", "ours"),
+    (placement_ignored, "placement", "double", "ours"),
+    (triangle_lost_for_all, "placement", "double", "ours"),
+    (sphere_met_again_from_inside, "lockstep, next hit", "double", "ours"),
+    (bent_by_index_1, "straight through", "double", "ours"),
+    (sub_rays_off, "camera rays", "double", "ours"),
     (mitsuba_hits_too_far, "distance, sphere", "double", "mitsuba"),
     (mitsuba_hits_too_far, "chain growth", "double", "mitsuba"),
     (mitsuba_normals_flipped, "normal, mesh", "single", "mitsuba"),
 ]
 
 
+PLACED = {
+    "camera": {"resolution": [32, 24], "origin": [0, 1, 5], "target": [0, 0, 0], "fov": 50},
+    "shapes": [
+        {"kind": "sphere", "center": [1, 0, 0], "radius": 1, "scale": 0.5, "rotate": [0, 90, 0]},
+        {"kind": "mesh", "builtin": "cube", "rotate": [10, 20, 30], "translate": [2, 0, 0]},
+    ],
+}
+
+
 def outcome(term: str, precision: str) -> Outcome:
     """On a random scene of a plane, spheres and solids, glass and mirrors, some thousandths in size; the
-    camera in the room, which is turned."""
-    scene = tracer.load("room") if term == "camera rays" else random_scene(3)
+    camera in the classic room, turned and with 3 x 3 rays a pixel; direct light under a disk."""
+    if term == "placement":
+        scene = tracer.load(PLACED)
+    else:
+        named = {"camera rays": "classic_rotated", "direct light": "light_disk"}
+        scene = tracer.load(named[term]) if term in named else random_scene(3)
     (found,) = run([scene], find_terms([term]), (precision,), RAYS)
     return found
 

@@ -135,6 +135,10 @@ def test_a_pixel_is_shown_vertex_by_vertex(validate: Run, tmp_path: Path) -> Non
     assert "light lamp        4 of 4                    4 of 4" in vertices[0]
     assert "the first; weight 1" in vertices[0] and "refracted; weight 0.6" in vertices[2]
     assert "mirrored x" in vertices[0] and "refracted z" in vertices[0]
+    color = vertices[-1].splitlines()
+    assert color[0] == "color of the pixel, one ray" and color[1].split()[-2:] == ["plain", "version"]
+    red = [float(cell) for cell in color[2].split()[1:]]
+    assert len(red) == 4 and max(red) - min(red) < 1e-5 and red[0] > 0.1
     assert not list(tmp_path.glob("reports"))
     chain = validate("small.toml", "--ray", "0", "1", "6", "0", "0", "-2", "--events", "TT")
     assert chain.returncode == 0, chain.stderr
@@ -173,7 +177,7 @@ def test_random_scenes_need_no_file(validate: Run) -> None:
     ("arguments", "sentence"),
     [
         (["nothing.toml"], "nothing.toml"),
-        (["small.toml", "--term", "hit"], "term: 'hit' is unknown; allowed are camera rays, "),
+        (["small.toml", "--term", "hit"], "term: 'hit' is unknown; allowed are placement; camera rays; "),
         (["small.toml", "--rays", "5"], "100"),
         (["room", "room"], "room: another scene is called 'room' as well"),
         (

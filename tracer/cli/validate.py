@@ -186,8 +186,8 @@ def show_ray(
 ) -> int:
     """Prints what all sides say of one ray."""
     from reference.comparison import Case
-    from reference.comparison.replay import free_ray, pixel_ray, replay_ray
-    from reference.comparison.replay_text import replay_text
+    from reference.comparison.replay import free_ray, pixel_colors, pixel_ray, replay_ray
+    from reference.comparison.replay_text import color_text, replay_text
     from tracer.errors import UsageError
 
     if (pixel is None) == (ray is None):
@@ -202,4 +202,6 @@ def show_ray(
     start = pixel_ray(case, *pixel) if pixel is not None else free_ray(ray or ())
     vertices = replay_ray(case, start, events)
     click.echo(replay_text(case.scene, vertices, start.o[0].tolist(), start.d[0].tolist()))
+    if pixel is not None and events is None:
+        click.echo("\n" + color_text(pixel_colors(case, *pixel)))
     return 0
