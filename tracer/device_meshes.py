@@ -96,10 +96,14 @@ def placed_meshes(scene: Scene) -> dict[int, PlacedMesh]:
 def _triangle_tables(
     backend: Backend, meshes: dict[int, PlacedMesh], first: np.ndarray
 ) -> tuple[TriangleTables, np.ndarray]:
-    """The triangles of all meshes in the order of the leaves, the tree over them, and the slot of each."""
-    corners = np.concatenate([mesh.corners for mesh in meshes.values()])
-    normals = np.concatenate([mesh.normals for mesh in meshes.values()])
-    primitives = np.concatenate([np.arange(len(mesh.corners)) + first[i] for i, mesh in meshes.items()])
+    """The triangles of all meshes in the order of the leaves, the tree over them, and the slot of each: -1
+    for those that are left out, because they have no area or repeat one of their mesh."""
+    wanted = np.concatenate([mesh.in_hierarchy for mesh in meshes.values()])
+    corners = np.concatenate([mesh.corners for mesh in meshes.values()])[wanted]
+    normals = np.concatenate([mesh.normals for mesh in meshes.values()])[wanted]
+    primitives = np.concatenate([np.arange(len(mesh.corners)) + first[i] for i, mesh in meshes.items()])[
+        wanted
+    ]
     hierarchy = build_hierarchy(corners)
     rows = np.zeros((len(corners), TRIANGLE_WORDS))
     rows[:, :9], rows[:, 9:12] = corners.reshape(-1, 9), normals
@@ -111,7 +115,9 @@ def _triangle_tables(
         count=backend.opaque_id(len(nodes) // OCTANTS),
         extent=backend.opaque(np.abs(corners).max()),
     )
-    return tables, np.argsort(hierarchy.order)
+    slots = np.full(len(wanted), -1)
+    slots[np.flatnonzero(wanted)[hierarchy.order]] = np.arange(len(corners))
+    return tables, slots
 
 
 def _enclosures(backend: Backend, meshes: dict[int, PlacedMesh]) -> list[Enclosure]:
@@ -133,19 +139,21 @@ def _enclosures(backend: Backend, meshes: dict[int, PlacedMesh]) -> list[Enclosu
 def is_convex(mesh: PlacedMesh, epsilon: float) -> bool:
     """Whether no triangle rises above another by more than the rounding of its own coordinates, which shadow
     rays do not notice (`CONTACT_SLACK`); large meshes are not looked at."""
-    n = len(mesh.corners)
-    if n > LARGEST_CONVEX:
+    if len(mesh.corners) > LARGEST_CONVEX:
         return False
-    planes = (mesh.normals * mesh.corners[:, 0]).sum(axis=1)
-    rises = (mesh.normals @ mesh.corners.reshape(-1, 3).T - planes[:, None]).reshape(n, n, 3).max(axis=2)
-    reach = np.abs(mesh.corners).max(axis=(1, 2))
+    corners, normals = mesh.corners[mesh.in_hierarchy], mesh.normals[mesh.in_hierarchy]
+    n = len(corners)
+    planes = (normals * corners[:, 0]).sum(axis=1)
+    rises = (normals @ corners.reshape(-1, 3).T - planes[:, None]).reshape(n, n, 3).max(axis=2)
+    reach = np.abs(corners).max(axis=(1, 2))
     return bool((rises <= CONTACT_SLACK / 4 * epsilon * reach).all())
 
 
 def _slot_of_primitive(counts: np.ndarray, meshes: dict[int, PlacedMesh], slots: np.ndarray) -> np.ndarray:
-    """For each primitive the slot of its triangle (0 for planes and spheres, which never ask)."""
+    """For each primitive the slot of its triangle (0 for what is never asked for: planes, spheres, triangles
+    that are left out)."""
     result = np.zeros(counts.sum(), np.int64)
-    result[np.repeat([i in meshes for i in range(len(counts))], counts)] = slots
+    result[np.repeat([i in meshes for i in range(len(counts))], counts)] = np.maximum(slots, 0)
     return result
 
 
@@ -155,6 +163,8 @@ def _smooth_tables(
     wanted = [i in meshes and bool(inherited(scene, shape, "smooth")) for i, shape in enumerate(scene.shapes)]
     if not any(wanted):
         return None
-    rows = np.zeros((len(slots), TRIANGLE_WORDS))
-    rows[slots, :9] = np.concatenate([mesh.corner_normals for mesh in meshes.values()]).reshape(-1, 9)
+    kept = slots >= 0
+    rows = np.zeros((int(kept.sum()), TRIANGLE_WORDS))
+    normals = np.concatenate([mesh.corner_normals for mesh in meshes.values()]).reshape(-1, 9)
+    rows[slots[kept], :9] = normals[kept]
     return SmoothTables(backend.table(rows), backend.id_table(wanted))

@@ -174,8 +174,8 @@ REFUSED = [
         "`shapes.0.scale.1` is 0; allowed: greater than 0",
     ),
     (
-        _shape(kind="mesh", file="a.stl"),
-        '`shapes.0.file` is "a.stl"; allowed: a file that ends in .obj or .ply',
+        _shape(kind="mesh", file="a.off"),
+        '`shapes.0.file` is "a.off"; allowed: a file that ends in .obj, .ply, .stl, .gltf or .glb',
     ),
     (_shape(**{**MESH, "faces": []}), "`shapes.0.faces` has 0 entries; allowed: at least 1"),
     (_shape(**{**MESH, "faces": [[0, 1]]}), "`shapes.0.faces.0` has 2 entries; allowed: at least 3"),

@@ -11,6 +11,7 @@ import pytest
 from reference import plain_files
 from tracer.placement import Placement
 from tracer.shapes import Mesh
+from tracer.shapes.repetitions import repeated
 from tracer.shapes.triangles import MeshData, place_mesh, read_mesh
 
 STILL = Mesh(builtin="cube").placement
@@ -90,12 +91,32 @@ def test_a_triangle_is_degenerate_only_when_it_is() -> None:
 
 def test_degenerate_triangles_keep_their_number() -> None:
     mesh = Mesh(
-        vertices=[[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]], faces=[[0, 1, 2, 3], [0, 1, 1], [0, 1, 3]]
+        vertices=[[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]],
+        faces=[[0, 1, 2], [0, 2, 3], [0, 1, 1], [0, 1, 3]],
     )
     data = read_mesh(mesh, None, "m")
-    assert data.faces.tolist() == [0, 0, 1, 2]
+    assert data.faces.tolist() == [0, 1, 2, 3]
     assert data.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [0, 1, 1], [0, 1, 3]]
-    assert place_mesh(data, STILL).normals[:, 2].tolist() == [0, 1, 0, 1]
+    placed = place_mesh(data, STILL)
+    assert placed.normals[:, 2].tolist() == [0, 1, 0, 1]
+    assert placed.in_hierarchy.tolist() == [False, True, False, True]
+
+
+def test_repetitions_are_found_whatever_their_winding() -> None:
+    """Also with the other zero, and by place, not by vertex number; one corner more does not make a pair."""
+    a, b, c, d = [0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]
+    corners = np.array([[a, b, c], [b, c, a], [c, b, a], [a, b, d], [[-0.0, 0.0, -0.0], b, d], [a, c, d]])
+    assert repeated(corners).tolist() == [False, True, True, False, True, False]
+    rng = np.random.default_rng(3)
+    soup = rng.integers(0, 4, (3000, 3, 3)).astype(float)
+    keys = [tuple(sorted(map(tuple, t))) for t in soup.tolist()]
+    assert repeated(soup).tolist() == [key in keys[:k] for k, key in enumerate(keys)]
+
+
+def test_a_mesh_of_nothing_but_degenerate_triangles_keeps_one() -> None:
+    mesh = Mesh(vertices=[[0, 0, 0], [1, 0, 0], [2, 0, 0]], faces=[[0, 1, 2], [2, 1, 0]])
+    placed = place_mesh(read_mesh(mesh, None, "m"), STILL)
+    assert placed.in_hierarchy.tolist() == [True, False]
 
 
 def test_vertices_are_rounded_as_read_and_as_placed() -> None:

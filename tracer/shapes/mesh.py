@@ -11,17 +11,19 @@ from tracer.messages import Refusal
 from tracer.records import PLAIN, FileName, Flag, Vec3
 from tracer.shapes.base import Scale3, ShapeRecord
 
-MESH_SUFFIXES = (".obj", ".ply")
+MESH_SUFFIXES = (".obj", ".ply", ".stl", ".gltf", ".glb")
 
 Index = Annotated[int, Field(strict=True, ge=0), PLAIN]
 Face = Annotated[tuple[Index, ...], Field(min_length=3), PLAIN]
 
 
 class Mesh(ShapeRecord):
-    """Triangles; faces with more corners are cut into triangles in order."""
+    """Triangles; faces with more corners are cut into triangles in order, concave ones too."""
 
     kind: Literal["mesh"] = Field(default="mesh", description="a triangle mesh")
-    file: FileName | None = Field(default=None, description="an OBJ or PLY file, relative to the scene file")
+    file: FileName | None = Field(
+        default=None, description="an OBJ, PLY, STL, glTF or GLB file, relative to the scene file"
+    )
     vertices: Annotated[tuple[Vec3, ...], Field(min_length=3), PLAIN] | None = Field(
         default=None, description="corner points [x, y, z]; with `faces`"
     )
@@ -65,5 +67,6 @@ class Mesh(ShapeRecord):
     @model_validator(mode="after")
     def _file_type(self) -> Self:
         if self.file is not None and not self.file.lower().endswith(MESH_SUFFIXES):
-            raise Refusal(f'is "{self.file}"; allowed: a file that ends in .obj or .ply', "file")
+            allowed = f"{', '.join(MESH_SUFFIXES[:-1])} or {MESH_SUFFIXES[-1]}"
+            raise Refusal(f'is "{self.file}"; allowed: a file that ends in {allowed}', "file")
         return self

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from tracer.errors import SceneError
-from tracer.messages import LONGEST_SHOWN
 from tracer.shapes.polygons import PolygonSoup
+from tracer.shapes.words import lines_of, short, three_floats
 
 _MOST = 2**31  # numbers from here on name nothing: no file holds as many vertices
 
@@ -104,7 +104,7 @@ def _statements(text: str) -> tuple[dict[str, _Points], _Faces]:
         keyword = words[0]
         try:
             if keyword in points:
-                points[keyword].numbers.extend(_three_floats(words))
+                points[keyword].numbers.extend(three_floats(words))
                 points[keyword].lines.append(line)
             elif keyword == "f":
                 if len(words) < 4:
@@ -122,9 +122,8 @@ def _lines(text: str) -> Iterator[tuple[int, list[str]]]:
     """(line number, words) of every line with content; a backslash at the end continues a line."""
     pending = ""
     first = 0
-    # Not `splitlines`: that also ends a line at a form feed and at separators that may stand in a comment.
     # The empty line at the end completes a last line that ends with a backslash.
-    for number, line in enumerate([*text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), ""], 1):
+    for number, line in enumerate([*lines_of(text), ""], 1):
         line = line.partition("#")[0].rstrip()
         first = first if pending else number
         if line.endswith("\\"):
@@ -134,21 +133,6 @@ def _lines(text: str) -> Iterator[tuple[int, list[str]]]:
         pending = ""
         if words:
             yield first, words
-
-
-def _three_floats(words: list[str]) -> list[float]:
-    if len(words) < 4:
-        raise ValueError(f"`{words[0]}` needs three numbers")
-    try:
-        return [_number(word) for word in words[1:4]]
-    except ValueError:
-        raise ValueError(f"`{_short(' '.join(words))}` is not three numbers") from None
-
-
-def _number(word: str) -> float:
-    if "_" in word:  # which Python allows between digits
-        raise ValueError
-    return float(word)
 
 
 class _Corners(dict[str, tuple[int, int]]):
@@ -165,7 +149,7 @@ class _Corners(dict[str, tuple[int, int]]):
                 raise ValueError
             numbers = _written_number(vertex), _written_number(normal) if normal else 0
         except ValueError:
-            raise ValueError(f"`{_short(word)}` is no corner of a face (v, v/vt, v//vn or v/vt/vn)") from None
+            raise ValueError(f"`{short(word)}` is no corner of a face (v, v/vt, v//vn or v/vt/vn)") from None
         if numbers[0] == 0 or (normal and numbers[1] == 0):
             raise ValueError(f"{'normal' if numbers[0] else 'vertex'} 0 does not exist")
         self[word] = numbers
@@ -181,7 +165,3 @@ def _check_finite(points: np.ndarray, lines: list[int], problem: str) -> None:
     finite = np.isfinite(points).all(axis=1)
     if not finite.all():
         raise _Wrong(lines[int(np.argmin(finite))], problem)
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}…"
