@@ -94,6 +94,18 @@ class MitsubaScene:
     def intersect(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike | None = None) -> Hits:
         """The nearest hits with 0 < t <= `t_max` (a number or (n,)) along unit directions. Mitsuba counts
         t = 0 as well, the model does not: such rays are asked once more, from a little farther on."""
+        o, d = (np.asarray(v, np.float32).astype(np.float64) for v in (origins, directions))
+        hits = self._nearest(o, d, t_max)
+        k = np.flatnonzero(hits.t == 0)
+        if len(k):
+            step = SHADOW_START * np.maximum(self.extent, np.abs(o[k]).max(axis=1))
+            limit = None if t_max is None else np.broadcast_to(np.asarray(t_max), len(o))[k] - step
+            for name, found in vars(self._nearest(o[k] + step[:, None] * d[k], d[k], limit)).items():
+                getattr(hits, name)[k] = found + step if name == "t" else found
+        return hits
+
+    def _nearest(self, origins: np.ndarray, directions: np.ndarray, t_max: ArrayLike | None) -> Hits:
+        """The nearest hits as Mitsuba counts them."""
         import drjit as dr
 
         if not np.size(origins):
@@ -108,20 +120,7 @@ class MitsubaScene:
         miss = ~valid[:, None]
         p = o + np.where(valid, t, np.nan)[:, None] * d
         n = np.where(miss, np.nan, si.n.numpy().T.astype(np.float64))
-        hits = Hits(t, shape, primitive, p, n, valid)
-        at_start = np.flatnonzero(t == 0)
-        return self._asked_again(hits, o, d, at_start, t_max) if len(at_start) else hits
-
-    def _asked_again(
-        self, hits: Hits, o: np.ndarray, d: np.ndarray, k: np.ndarray, t_max: ArrayLike | None
-    ) -> Hits:
-        """The hits with those of some rays (by number) from a step further on in place of their own."""
-        step = SHADOW_START * np.maximum(self.extent, np.abs(o[k]).max(axis=1))
-        limit = None if t_max is None else np.broadcast_to(np.asarray(t_max), len(o))[k] - step
-        other = self.intersect(o[k] + step[:, None] * d[k], d[k], limit)
-        for name, found in vars(other).items():
-            getattr(hits, name)[k] = found + step if name == "t" else found
-        return hits
+        return Hits(t, shape, primitive, p, n, valid)
 
     def visible(self, points: ArrayLike, targets: ArrayLike) -> np.ndarray:
         """(n,) bool: nothing lies between points and targets (n, 3), 1e-5 S at either end left out.
