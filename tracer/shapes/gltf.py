@@ -19,7 +19,7 @@ from tracer.shapes.gltf_file import GltfFile, entries, table
 from tracer.shapes.gltf_nodes import IDENTITY, Matrix, applied, cofactors, determinant, node_matrix, product
 from tracer.shapes.polygons import PolygonSoup
 
-Primitive = tuple[np.ndarray, "np.ndarray | None", np.ndarray]
+Primitive = tuple[np.ndarray, np.ndarray | None, np.ndarray]
 """Vertices (n, 3), normals (n, 3) or None, faces (m, 3)."""
 
 MOST_TRIANGLES = 50_000_000

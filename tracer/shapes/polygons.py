@@ -12,7 +12,7 @@ import numpy as np
 
 from tracer.errors import SceneError
 
-Polygons: TypeAlias = "Sequence[Sequence[int]] | np.ndarray"
+Polygons: TypeAlias = Sequence[Sequence[int]] | np.ndarray
 """For each face the numbers of its corners; an array (m, 3) where all faces are triangles."""
 
 
