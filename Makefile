@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help setup render gallery validate docs test lint format clean distclean
+.PHONY: help setup render gallery validate bench docs test lint format clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -21,6 +21,9 @@ gallery: setup ## render every scene of scenes/ into docs/gallery; what did not 
 
 validate: setup ## compare with Mitsuba ray by ray: the full report, its summary in reports/, the headline numbers in README.md
 	@$(BIN)/tracer validate --full --summary reports/crossvalidation.md --headline README.md
+
+bench: setup ## measure speed and memory next to Mitsuba and POV-Ray, everything: reports/benchmark/index.html and its summary
+	@$(BIN)/tracer bench --full --summary reports/benchmark.md
 
 docs: setup ## build the documentation site into build/docs; open build/docs/index.html
 	@$(BIN)/python -m sphinx -q -W -n --keep-going -d build/doctrees docs build/docs
@@ -39,7 +42,7 @@ format: setup ## lay out the code and sort the imports
 
 clean: ## remove pictures, caches and builds
 	rm -rf out build dist .mypy_cache .pytest_cache .ruff_cache
-	find tracer reference tests benchmarks scripts docs assets -type d -name __pycache__ -prune -exec rm -rf {} + 2>/dev/null || true
+	find tracer reference tests scripts docs assets -type d -name __pycache__ -prune -exec rm -rf {} + 2>/dev/null || true
 
 distclean: clean ## remove the virtual environment too
 	rm -rf $(VENV)

@@ -55,7 +55,7 @@ def diagnose() -> dict[str, Any]:
         "tracer": _version(DISTRIBUTION),
         "python": platform.python_version(),
         "system": platform.platform(),
-        "cores": _cores(),
+        "cores": cores(),
         "packages": {name: _version(name) for name in _PACKAGES},
         "llvm": {
             "works": bool(tried.get("llvm")),
@@ -154,7 +154,7 @@ def _requirement(package: str) -> str:
     return next((name for name in names if re.match(rf"{package}\b", name)), package)
 
 
-def _cores() -> int:
+def cores() -> int:
     """Processor cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.metadata
-import os
 import platform
 import re
 import shutil
@@ -14,7 +13,8 @@ from pathlib import Path
 
 import tracer
 from reference.mitsuba_variant import mitsuba
-from tracer.doctor import DISTRIBUTION
+from tracer.doctor import DISTRIBUTION, cores
+from tracer.errors import MachineError
 from tracer.llvm import ensure_llvm
 
 COMMAND = "command to repeat"
@@ -24,16 +24,28 @@ COMMAND = "command to repeat"
 def header_of(command: str, precisions: Sequence[str], backend: str, rays: int, seed: int) -> dict[str, str]:
     """Name and value, in the order of a report; `rays` are those of a scene. Raises `MachineError` without
     Mitsuba or LLVM."""
+    mitsuba()
+    return machine_facts() | {
+        "backend": backend,
+        "precisions" if len(precisions) > 1 else "precision": ", ".join(precisions),
+        "rays a scene": f"{rays:,}",
+        "seed": str(seed),
+        COMMAND: command,
+    }
+
+
+def machine_facts() -> dict[str, str]:
+    """When, with which versions and on what machine; without Mitsuba where it is not installed. Raises
+    `MachineError` without LLVM."""
     ensure_llvm()
     import drjit as dr  # not before an LLVM was chosen for it
 
-    other = mitsuba()
     commit = _commit(Path(tracer.__file__).resolve().parents[1])
     return {
         "date": datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC"),
         "tracer": importlib.metadata.version(DISTRIBUTION),
         **({"commit": commit} if commit else {}),
-        "Mitsuba": f"{other.__version__}, {other.variant()}",
+        **_mitsuba(),
         "Dr.Jit": importlib.metadata.version("drjit"),
         "LLVM": ".".join(map(str, dr.detail.llvm_version())),
         "NumPy": importlib.metadata.version("numpy"),
@@ -41,12 +53,15 @@ def header_of(command: str, precisions: Sequence[str], backend: str, rays: int, 
         "system": f"{platform.system()} {platform.machine()}",
         "processor": _processor(),
         "GPU": _gpu(),
-        "backend": backend,
-        "precisions" if len(precisions) > 1 else "precision": ", ".join(precisions),
-        "rays a scene": f"{rays:,}",
-        "seed": str(seed),
-        COMMAND: command,
     }
+
+
+def _mitsuba() -> dict[str, str]:
+    try:
+        other = mitsuba()
+    except MachineError:
+        return {}
+    return {"Mitsuba": f"{other.__version__}, {other.variant()}"}
 
 
 def _commit(root: Path) -> str:
@@ -65,9 +80,8 @@ def _processor() -> str:
     except OSError:
         named = None
     name = named.group(1).strip() if named else platform.processor() or platform.machine()
-    affine = hasattr(os, "sched_getaffinity")
-    cores = len(os.sched_getaffinity(0)) if affine else os.cpu_count() or 1
-    return f"{name}, {cores} core{'s' if cores > 1 else ''}"
+    count = cores()
+    return f"{name}, {count} core{'s' if count > 1 else ''}"
 
 
 def _gpu() -> str:

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
-
-import jinja2
 
 from reference.comparison.records import Validation
 from reference.comparison.run import terms as all_terms
-from reference.report import bounds, numbers
+from reference.report import bounds, look
 from reference.report.header import COMMAND
 from reference.report.headline import Headline
 from reference.report.matrix import CLASSES, matrix
@@ -18,8 +15,6 @@ from reference.report.sections import Section, sections_of
 from reference.report.summary import term_rows
 from reference.tolerances import TOLERANCES
 from tracer.film.atomic import atomic_write
-
-TEMPLATES = Path(__file__).resolve().parent / "templates"
 
 
 def write_report(path: str | os.PathLike[str], validation: Validation) -> None:
@@ -31,16 +26,7 @@ def write_report(path: str | os.PathLike[str], validation: Validation) -> None:
 
 def page(validation: Validation) -> str:
     """The text of the page."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    for name in ("number", "count", "percent", "times", "unit"):
-        environment.filters[name] = getattr(numbers, name)
+    environment = look.environment(look.TEMPLATES)
     environment.filters["used"] = bounds.used
     environment.filters["broken"] = bounds.broken
     sections = sections_of(validation.outcomes)
@@ -62,8 +48,8 @@ def page(validation: Validation) -> str:
         tolerances=TOLERANCES,
         bar=bar(),
         depth_bar=viridis_bar(),
-        css="".join((TEMPLATES / name).read_text(encoding="utf-8") for name in ("report.css", "scene.css")),
-        script=(TEMPLATES / "report.js").read_text(encoding="utf-8"),
+        css=look.css(),
+        script=look.script(),
     )
 
 

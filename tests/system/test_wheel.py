@@ -75,8 +75,9 @@ def test_the_wheel_holds_scenes_and_assets_and_no_leftovers(wheel: Path, reposit
         assert {f"tracer/data/{folder}/{file.name}" for file in files} <= names
     assert {"tracer/py.typed", "tracer/cli/classic.py", "reference/plain.py"} <= names
     assert "reference/report/templates/page.html.j2" in names
+    assert "reference/bench/report/templates/bench.html.j2" in names
     assert not [name for name in names if "__pycache__" in name or name.endswith((".pyc", ".partial.png"))]
-    assert not [name for name in names if name.split("/")[0] in ("tests", "benchmarks", "scripts", "docs")]
+    assert not [name for name in names if name.split("/")[0] in ("tests", "scripts", "docs")]
     assert all(name.split("/")[0] in ("tracer", "reference") or ".dist-info/" in name for name in names)
 
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import click
 
+from tracer.cli.bench import bench
 from tracer.cli.classic import classic
 from tracer.cli.compare import compare
 from tracer.cli.doctor import doctor
@@ -44,7 +45,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (render, classic, scenes, info, compare, validate, export, doctor):
+for _command in (render, classic, scenes, info, compare, validate, bench, export, doctor):
     cli.add_command(_command)
 
 

@@ -1,0 +1,156 @@
+"""Rays a second by kind: our hierarchy next to Embree, both asked from inside Dr.Jit, in one process.
+
+Both sides get the same rays in the memory of Dr.Jit, and write back what an integrator needs: the distance
+and the primitive, or whether something is there. Embree is told which rays are coherent. The time is that of
+the kernels, as Dr.Jit's history has it; that of Python, which records them, is not in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+import tracer
+from reference.bench.frames import Check
+from reference.bench.rays import KINDS, Rays, primary, secondary
+from reference.bench.records import Rate, Series
+from tracer.backends import Backend, exact_arithmetic, find_backend
+from tracer.device_scene import compile_scene
+from tracer.intersection import closest_hit, free_ray
+from tracer.queries import intersect
+
+Query = Callable[[], Any]
+"""Traces all rays of one kind once; the mask of those that hit something."""
+
+
+def rates_of(
+    mesh: str, scene: tracer.Scene, peers: Sequence[str], pixels: int, repeat: int, check: Check
+) -> list[Rate]:
+    """All kinds of rays on one mesh by tracer and, where it is among the peers, by Mitsuba."""
+    rays = _rays(scene, pixels)
+    sides: dict[str, Any] = {}
+    if "tracer" in peers:
+        sides["tracer"] = Ours(scene)
+    if "mitsuba" in peers:
+        sides["mitsuba"] = Embree(scene)
+    found = []
+    for kind in KINDS:
+        found += _interleaved(mesh, kind, rays[kind], sides, repeat)
+        check()
+    return found
+
+
+def _rays(scene: tracer.Scene, pixels: int) -> dict[str, Rays]:
+    """Rays by kind; the primary hits that others start from are found in double precision."""
+    tiles = primary(pixels, tiles=True)
+    hits = intersect(scene, tiles.o, tiles.d, backend="llvm")
+    named = dict(zip(KINDS[:2], (primary(pixels, tiles=False), tiles), strict=True))
+    return named | secondary(tiles, hits.t, hits.normal)
+
+
+def _interleaved(mesh: str, kind: str, rays: Rays, sides: dict[str, Any], repeat: int) -> list[Rate]:
+    queries: dict[str, Query] = {peer: side.query(rays, kind) for peer, side in sides.items()}
+    hits = {peer: int(np.count_nonzero(query().numpy())) for peer, query in queries.items()}
+    seconds: dict[str, list[float]] = {peer: [] for peer in queries}
+    for _ in range(repeat):
+        for peer, query in queries.items():
+            seconds[peer].append(kernel_seconds(query))
+    return [Rate(mesh, kind, peer, rays.count, hits[peer], Series(tuple(seconds[peer]))) for peer in queries]
+
+
+def kernel_seconds(query: Query) -> float:
+    """How long the kernels of one call run."""
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+        dr.kernel_history_clear()
+        query()
+        dr.sync_thread()
+        history = dr.kernel_history((dr.KernelType.JIT,))
+    return sum(entry["execution_time"] for entry in history) / 1e3
+
+
+class Ours:
+    """The Dr.Jit level of the tracer, in single precision."""
+
+    def __init__(self, scene: tracer.Scene) -> None:
+        self._backend: Backend = find_backend("llvm", "single")
+        self._device = compile_scene(scene, self._backend)
+
+    def query(self, rays: Rays, kind: str) -> Query:
+        """Closest hits, or any hit for shadow rays."""
+        backend = self._backend
+        o, d = (_vector(backend.Vector3, a) for a in (rays.o, rays.d))
+        limit = None if rays.length is None else backend.Float(rays.length)
+        active = dr.full(backend.Bool, True, rays.count)
+        dr.eval(o, d, limit, active)
+
+        def closest() -> Any:
+            with exact_arithmetic():
+                hit = closest_hit(self._device, free_ray(self._device, o, d), active)
+                dr.eval(hit)
+            return hit.valid
+
+        def anything() -> Any:
+            with exact_arithmetic():
+                blocked = any_triangle(self._device, free_ray(self._device, o, d), limit, active)
+                dr.eval(blocked)
+            return blocked
+
+        return closest if limit is None else anything
+
+
+def any_triangle(device: Any, ray: Any, length: Any, active: Any) -> Any:
+    """Mask: some triangle is hit before `length`; the walk ends with the first."""
+    from tracer.acceleration.traverse import visit_triangles
+    from tracer.intersection import departure
+
+    backend = device.backend
+    return visit_triangles(
+        backend,
+        device.triangles,
+        ray,
+        lambda: departure(device, ray),
+        state=dr.full(backend.Bool, False, dr.width(ray.d)),
+        limit=lambda blocked: dr.select(blocked, backend.Float(-1), length),
+        visit=lambda blocked, _t, _primitive, _test, valid: blocked | valid,
+        active=active,
+    )
+
+
+class Embree:
+    """Mitsuba's scene, with robust intersections as in `reference.mitsuba_scene`."""
+
+    def __init__(self, scene: tracer.Scene) -> None:
+        from reference.mitsuba_scene import build
+        from reference.mitsuba_variant import mitsuba
+
+        self._mi = mitsuba()
+        self._scene = build(scene).scene
+
+    def query(self, rays: Rays, kind: str) -> Query:
+        """Closest hits, or any hit for shadow rays."""
+        mi, scene = self._mi, self._scene
+        o, d = (_vector(mi.Vector3f, a) for a in (rays.o, rays.d))
+        ray = mi.Ray3f(mi.Point3f(o), d)
+        if rays.length is not None:
+            ray.maxt = mi.Float(rays.length)
+        coherent = kind.startswith("primary")
+        dr.eval(ray)
+
+        def closest() -> Any:
+            hit = scene.ray_intersect_preliminary(ray, coherent=coherent)
+            dr.eval(hit.t, hit.prim_index, hit.shape_index)
+            return hit.is_valid()
+
+        def anything() -> Any:
+            blocked = scene.ray_test(ray, coherent=coherent)
+            dr.eval(blocked)
+            return blocked
+
+        return closest if rays.length is None else anything
+
+
+def _vector(kind: Any, values: np.ndarray) -> Any:
+    return kind(*(np.ascontiguousarray(values[:, axis]) for axis in range(3)))

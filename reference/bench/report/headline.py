@@ -1,0 +1,33 @@
+"""The few numbers that a run comes down to, all of them ratios."""
+
+from __future__ import annotations
+
+from math import isnan
+from typing import NamedTuple
+
+from reference.bench.records import PEERS, Benchmark
+
+
+class Headline(NamedTuple):
+    """A ratio and what it is."""
+
+    value: float
+    words: str
+
+
+def headline_of(benchmark: Benchmark) -> list[Headline]:
+    """Frames of scenes against the peers, and rays against Embree on the largest mesh that was measured."""
+    found = []
+    scenes = next((group.points for group in benchmark.groups if group.name == "scenes"), ())
+    for point in scenes[:2]:
+        for peer in ("mitsuba", "povray"):
+            if not isnan(point.ratio(peer)):
+                words = f"times as long as tracer takes {PEERS[peer]} for a frame of {point.name}"
+                found.append(Headline(point.ratio(peer), words))
+    for kind in ("primary, tile order", "shadow"):
+        of = {rate.peer: rate for rate in benchmark.rates if rate.kind == kind}
+        if {"tracer", "mitsuba"} <= set(of):
+            value = of["tracer"].per_second / of["mitsuba"].per_second
+            words = f"times Embree's rays a second: {kind}, mesh {of['tracer'].mesh}"
+            found.append(Headline(value, words))
+    return found

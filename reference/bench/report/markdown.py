@@ -1,0 +1,106 @@
+"""A run in Markdown: ratios first, kept with the sources."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from reference.bench.rays import KINDS
+from reference.bench.records import PEERS, Benchmark, Group, Point
+from reference.bench.report.headline import headline_of
+from reference.bench.report.units import NOTHING, duration, mebibytes, million, ratio
+from reference.report.header import COMMAND
+
+
+def summary_of(benchmark: Benchmark) -> str:
+    """Headline, a table a group, rays a second, builds, what was left out, with what it was made."""
+    facts = {name: value for name, value in benchmark.header.items() if name != COMMAND}
+    lines = [
+        "# Benchmark",
+        "",
+        *(f"- **{ratio(each.value)}** {each.words}" for each in headline_of(benchmark)),
+    ]
+    lines += ["", *_plain(READING)]
+    for group in benchmark.groups:
+        lines += ["", f"## {group.title}", "", *_table(group)]
+    if any(point.processes for group in benchmark.groups for point in group.points):
+        lines += ["", "## The first picture, and memory", "", *_processes(benchmark)]
+    if benchmark.rates:
+        lines += ["", "## Million rays a second, by kind", "", *_rates(benchmark)]
+    if benchmark.builds:
+        lines += ["", "## From a file to a hierarchy", "", *_builds(benchmark)]
+    if benchmark.notes:
+        lines += ["", "## What was left out", "", *(f"- {note}" for note in benchmark.notes)]
+    lines += ["", "## With what it was made", "", *_rows(("what", "value"), facts.items())]
+    if COMMAND in benchmark.header:
+        lines += ["", f"To repeat it:\n\n    {benchmark.header[COMMAND]}"]
+    return "\n".join(lines) + "\n"
+
+
+READING = (
+    "Times are medians of interleaved rounds in one run, minima in parentheses; other work on the machine "
+    "moves them, so quote the ratios. A ratio above 1 means that tracer is faster. Frames are traced only: "
+    "reading, hierarchies and processes are in tables of their own.",
+)
+
+
+def _plain(sentences: Sequence[str]) -> list[str]:
+    return list(sentences)
+
+
+def _table(group: Group) -> Iterator[str]:
+    names = [peer for peer in PEERS if any(point.frame(peer) for point in group.points)]
+    head = [group.axis, *(PEERS[peer] for peer in names)]
+    head += [f"{PEERS[peer]} over tracer" for peer in names if peer != "tracer"]
+    rows = []
+    for point in group.points:
+        ratios = [f"{ratio(point.ratio(p))} ({ratio(point.ratio(p, True))})" for p in names if p != "tracer"]
+        rows.append([point.name, *(_time(point, peer) for peer in names), *ratios])
+    return _rows(head, rows)
+
+
+def _time(point: Point, peer: str) -> str:
+    frame = point.frame(peer)
+    return NOTHING if frame is None else f"{duration(frame.trace.median)} ({duration(frame.trace.least)})"
+
+
+def _processes(benchmark: Benchmark) -> Iterator[str]:
+    rows = [
+        (
+            point.name,
+            PEERS[each.peer],
+            *map(duration, (each.first, each.later, each.process)),
+            mebibytes(each.peak),
+        )
+        for group in benchmark.groups
+        for point in group.points
+        for each in point.processes
+    ]
+    return _rows(
+        ("scene", "renderer", "first frame", "a later one", "process, one frame", "most memory"), rows
+    )
+
+
+def _rates(benchmark: Benchmark) -> Iterator[str]:
+    of = {(rate.mesh, rate.kind, rate.peer): rate.per_second for rate in benchmark.rates}
+    nothing = float("nan")
+    rows = []
+    for mesh in dict.fromkeys(rate.mesh for rate in benchmark.rates):
+        for kind in KINDS:
+            ours, theirs = (of.get((mesh, kind, peer), nothing) for peer in ("tracer", "mitsuba"))
+            rows.append((mesh, kind, million(ours), million(theirs), ratio(ours / theirs)))
+    return _rows(("mesh", "rays", "tracer", "Embree", "tracer over Embree"), rows)
+
+
+def _builds(benchmark: Benchmark) -> Iterator[str]:
+    rows = [
+        (f"{each.triangles:,}", PEERS[each.peer], duration(each.read.least), duration(each.build.least))
+        for each in benchmark.builds
+    ]
+    return _rows(("triangles", "renderer", "reading the file", "the hierarchy"), rows)
+
+
+def _rows(head: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
+    yield f"| {' | '.join(head)} |"
+    yield f"|{'---|' * len(head)}"
+    for row in rows:
+        yield f"| {' | '.join(row)} |"
