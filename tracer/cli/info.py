@@ -27,9 +27,12 @@ def info(scene: str, overrides: tuple[str, ...], allow_outside: bool) -> None:
       tracer info my.toml --set camera.fov=30
     """
     from tracer.scene import find_scene, load
+    from tracer.shapes.triangles import files_read_once
 
     loaded = load(scene, allow_outside=allow_outside, overrides=overrides)
-    for name, value in describe(loaded, str(find_scene(scene)[0])):
+    with files_read_once():
+        rows = describe(loaded, str(find_scene(scene)[0]))
+    for name, value in rows:
         click.echo(f"{name:<12}{value}")
 
 

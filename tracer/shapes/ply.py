@@ -6,10 +6,8 @@ Turk, The PLY Polygon File Format, 1994.
 
 from __future__ import annotations
 
-import re
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,24 +15,12 @@ import numpy as np
 
 from tracer.errors import SceneError
 from tracer.messages import LONGEST_SHOWN
-from tracer.shapes.polygons import PolygonSoup, check_faces
+from tracer.shapes.ply_header import WIDTHS, Element, read_header
+from tracer.shapes.polygons import Polygons, PolygonSoup, check_faces
+from tracer.shapes.words import short
 
-_TYPES = {  # the old and the new names of the types of numbers, as `struct` and NumPy write them
-    **dict(zip("char uchar short ushort int uint float double".split(), "bBhHiIfd", strict=True)),
-    **dict(zip("int8 uint8 int16 uint16 int32 uint32 float32 float64".split(), "bBhHiIfd", strict=True)),
-}
-_WIDTHS = {kind: struct.calcsize(f"={kind}") for kind in _TYPES.values()}
-_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _FACE_LISTS = ("vertex_indices", "vertex_index")
-
-
-@dataclass
-class _Element:
-    """One element of the header: its properties, name to (type, type of the list's length or None)."""
-
-    name: str
-    count: int
-    properties: dict[str, tuple[str, str | None]] = field(default_factory=dict)
+_MOST = 2**53  # numbers beyond name nothing
 
 
 def read_ply(path: Path) -> PolygonSoup:
@@ -44,64 +30,15 @@ def read_ply(path: Path) -> PolygonSoup:
     except OSError as error:
         raise SceneError(f"{path}: cannot be read ({error.strerror})") from None
     try:
-        order, elements, body = _header(data)
+        order, elements, body = read_header(data)
         reader = _Reader(body, order)
         values = {element.name: reader.read(element) for element in elements}
         vertices, normals = _vertices(values["vertex"])
         faces = _faces(values.get("face", {}))
     except (ValueError, KeyError) as error:
         raise SceneError(f"{path}: is damaged or no PLY file ({error})") from None
-    check_faces(path, faces, len(vertices), "vertex")
-    face_normals = faces if len(normals) else [[-1] * len(polygon) for polygon in faces]
-    return PolygonSoup(vertices, normals, faces, face_normals)
-
-
-# ---- Header ------------------------------------------------------------------------------------
-
-
-def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
-    """Byte order ("" for ascii), elements, and what follows the header."""
-    start = re.match(rb"ply[ \t]*(\r\n|\n|\r)", data)
-    newline = b"\r" if start and start[1] == b"\r" else b"\n"
-    end = re.search(newline + rb"end_header[ \t\r]*?" + newline, data)
-    if start is None or end is None:
-        raise ValueError("it has no PLY header")
-    form, elements = "missing", list[_Element]()
-    for number, line in enumerate(data[: end.start()].decode("ascii", errors="replace").splitlines(), 1):
-        words = line.split()
-        try:
-            if words[:1] == ["format"]:
-                form = words[1]
-            elif words[:1] == ["element"]:
-                elements.append(_element(words, elements))
-            elif words[:1] == ["property"]:
-                _add_property(words, elements[-1])
-        except (ValueError, KeyError, IndexError):
-            raise ValueError(f"line {number} of its header is `{line.strip()[:LONGEST_SHOWN]}`") from None
-    if form not in _ORDERS:
-        raise ValueError(f"its format is {form[:LONGEST_SHOWN]}")
-    return _ORDERS[form], elements, data[end.end() :]
-
-
-def _element(words: list[str], others: list[_Element]) -> _Element:
-    """`element NAME COUNT`; ValueError where that is wrong or said before."""
-    _, name, count = words
-    if int(count) < 0 or any(other.name == name for other in others):
-        raise ValueError
-    return _Element(name, int(count))
-
-
-def _add_property(words: list[str], element: _Element) -> None:
-    """`property TYPE NAME` or `property list TYPE TYPE NAME`; ValueError or KeyError where that is wrong."""
-    *kinds, name = words[1:]
-    if name in element.properties:
-        raise ValueError
-    if kinds[:1] == ["list"]:
-        _, length, kind = kinds
-        element.properties[name] = _TYPES[kind], _TYPES[length]
-    else:
-        (kind,) = kinds
-        element.properties[name] = _TYPES[kind], None
+    check_faces(path, faces, len(vertices))
+    return PolygonSoup(vertices, normals, faces, faces if len(normals) else ())
 
 
 # ---- Body --------------------------------------------------------------------------------------
@@ -112,17 +49,20 @@ class _Reader:
 
     def __init__(self, body: bytes, order: str) -> None:
         self._stream: Any = body if order else _numbers(body)
-        self._widths = _WIDTHS if order else dict.fromkeys(_WIDTHS, 1)
+        self._widths = WIDTHS if order else dict.fromkeys(WIDTHS, 1)
         self._order, self._at = order, 0
 
-    def read(self, element: _Element) -> dict[str, Any]:
+    def read(self, element: Element) -> dict[str, Any]:
         """A column per property; for lists (all numbers in a row, lengths)."""
         kinds = element.properties
         smallest = sum(self._widths[length or kind] for kind, length in kinds.values())
         if element.count * smallest > len(self._stream) - self._at:
-            raise ValueError(f"it ends before its {element.count} entries of `{element.name}`")
+            raise ValueError(f"it ends before its {element.count} entries of `{short(element.name)}`")
         if not any(length_kind for _, length_kind in kinds.values()):
             return self._table(element.count, {name: kind for name, (kind, _) in kinds.items()})
+        uniform = self._uniform(element) if self._order and element.count else None
+        if uniform is not None:
+            return uniform
         columns = [(list[float](), list[int](), *kind) for kind in kinds.values()]
         for _ in range(element.count):
             for numbers, lengths, kind, length_kind in columns:
@@ -131,6 +71,27 @@ class _Reader:
                 lengths.append(length)
         pairs = zip(kinds, columns, strict=True)
         return {name: column[:2] if column[3] else column[0] for name, column in pairs}
+
+    def _uniform(self, element: Element) -> dict[str, Any] | None:
+        """The columns of an element whose lists are all as long as those of its first entry; else None."""
+        start, layout = self._at, list[tuple[Any, ...]]()
+        lists = list[tuple[str, int]]()
+        for name, (kind, length_kind) in element.properties.items():
+            length = self._length(length_kind) if length_kind else 1
+            self._take(kind, length)
+            if length_kind:
+                lists.append((name, length))
+                layout.append((f"length of {name}", self._order + length_kind))
+            layout.append((name, self._order + kind, (length,)))
+        size, self._at = self._at - start, start
+        if size * element.count > len(self._stream) - start:
+            return None
+        rows: Any = np.frombuffer(self._stream, np.dtype(layout), element.count, start)
+        if not all((rows[f"length of {name}"] == length).all() for name, length in lists):
+            return None
+        self._at += size * element.count
+        columns: dict[str, Any] = {name: rows[name].reshape(-1) for name in element.properties}
+        return columns | {name: (columns[name], np.full(len(rows), length)) for name, length in lists}
 
     def _length(self, kind: str) -> int:
         (number,) = self._take(kind, 1)
@@ -195,14 +156,17 @@ def _vectors(columns: dict[str, Any], names: tuple[str, str, str]) -> np.ndarray
     return np.column_stack([np.asarray(columns[name], np.float64) for name in names])
 
 
-def _faces(columns: dict[str, Any]) -> list[list[int]]:
+def _faces(columns: dict[str, Any]) -> Polygons:
     """The vertex numbers of each face, not yet checked against the number of vertices."""
     key = next((name for name in _FACE_LISTS if isinstance(columns.get(name), tuple)), None)
-    numbers, lengths = columns[key] if key else ([], [])
-    if min(lengths, default=3) < 3:
-        number = next(number for number, length in enumerate(lengths) if length < 3)
-        raise ValueError(f"face {number} has fewer than three corners")
-    if not all(map(float.is_integer, map(float, numbers))):
+    numbers, lengths = (np.asarray(column) for column in columns[key]) if key else (np.zeros(0), np.zeros(0))
+    lengths = lengths.astype(np.int64)
+    if (lengths < 3).any():
+        raise ValueError(f"face {np.argmax(lengths < 3)} has fewer than three corners")
+    if not (np.isfinite(numbers) & (np.floor(numbers) == numbers)).all():
         raise ValueError("a face names a vertex that is no whole number")
-    corners, ends = list(map(int, numbers)), np.cumsum(lengths, dtype=np.int64).tolist()
-    return [corners[end - length : end] for end, length in zip(ends, lengths, strict=True)]
+    corners = np.clip(numbers, -_MOST, _MOST).astype(np.int64)
+    if (lengths == 3).all():
+        return corners.reshape(-1, 3)
+    all_corners, ends = corners.tolist(), np.cumsum(lengths).tolist()
+    return [all_corners[end - length : end] for end, length in zip(ends, lengths.tolist(), strict=True)]

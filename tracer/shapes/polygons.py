@@ -48,12 +48,14 @@ def flat(polygons: Polygons) -> np.ndarray:
     return np.fromiter(chain.from_iterable(polygons), np.int64)
 
 
-def check_faces(path: Path, faces: list[list[int]], count: int, what: str) -> None:
-    """Raises `SceneError` for a number that names nothing; -1 among normals means "none"."""
-    lowest = 0 if what == "vertex" else -1
+def check_faces(path: Path, faces: Polygons, count: int) -> None:
+    """Raises `SceneError` for the number of a vertex that does not exist."""
+    numbers = flat(faces)
+    if not ((numbers < 0) | (numbers >= count)).any():
+        return
     for number, face in enumerate(faces):
-        if max(face) >= count or min(face) < lowest:
+        if max(face) >= count or min(face) < 0:
             wrong = max(face) if max(face) >= count else min(face)
             raise SceneError(
-                f"{path}: face {number} names {what} {wrong}, counted from 0; the file has {count}"
+                f"{path}: face {number} names vertex {wrong}, counted from 0; the file has {count}"
             )

@@ -6,7 +6,9 @@ precision, every backend and Mitsuba see the same triangles.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -52,6 +54,10 @@ class MeshData:
     places: np.ndarray | None = None
 
 
+_READ: ContextVar[dict[Path, MeshData] | None] = ContextVar("_READ", default=None)
+"""What `files_read_once` has read so far."""
+
+
 @dataclass(frozen=True)
 class PlacedMesh:
     """Triangles in world space. `corners` (m, 3, 3), unit `normals` (m, 3; zero: degenerate), `faces` (m,),
@@ -86,10 +92,27 @@ def read_mesh(mesh: Mesh, path: Path | None, where: str) -> MeshData:
     if path is None:
         assert mesh.vertices is not None and mesh.faces is not None
         return _triangles(_plain_soup(mesh.vertices, mesh.faces), where)
+    read = _READ.get()
+    if read is not None and path in read:
+        return read[path]
     soup = read_polygons(path)
     if len(soup.faces) == 0:
         raise SceneError(f"{where}.file: {path} has no faces; allowed: a mesh with one triangle at least")
-    return _triangles(soup, str(path))
+    data = _triangles(soup, str(path))
+    if read is not None:
+        read[path] = data
+    return data
+
+
+@contextmanager
+def files_read_once() -> Iterator[None]:
+    """In this context a mesh file that is asked for again is not read again: a large one takes seconds, and a
+    command needs it for warnings and for the picture."""
+    token = _READ.set({})
+    try:
+        yield
+    finally:
+        _READ.reset(token)
 
 
 def place_mesh(data: MeshData, placement: Placement) -> PlacedMesh:
@@ -100,27 +123,28 @@ def place_mesh(data: MeshData, placement: Placement) -> PlacedMesh:
         areas = accurate_areas(corners)
     if len(data.normals):
         # Unit length first: a length from the file times a scale could leave the range of double precision.
-        corner_normals = placement.normals(_unit(data.normals).reshape(-1, 3)).reshape(-1, 3, 3)
+        corner_normals = _unit(placement.normals(_unit(data.normals).reshape(-1, 3)).reshape(-1, 3, 3))
     else:
         triangles = data.triangles if data.places is None else data.places[data.triangles]
-        corner_normals = _area_weighted(triangles, areas, len(vertices))
-    return PlacedMesh(corners, _unit(areas), data.faces, _unit(corner_normals), repeated(corners))
+        corner_normals = _unit(_area_weighted(triangles, areas, len(vertices)))[triangles]
+    return PlacedMesh(corners, _unit(areas), data.faces, corner_normals, repeated(corners))
 
 
 def _area_weighted(triangles: np.ndarray, areas: np.ndarray, vertices: int) -> np.ndarray:
-    """(m, 3, 3): at each corner the sum of the areas of all triangles that name its vertex."""
+    """(n, 3): for each vertex the sum of the areas of all triangles that name it."""
     sums = np.zeros((vertices, 3))
     for corner in range(3):
         np.add.at(sums, triangles[:, corner], areas)
-    return sums[triangles]
+    return sums
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
     """Unit vectors along the last axis; zero stays zero. Scaled first, by a power of two: squares must
     neither vanish nor overflow."""
-    exponents = np.frexp(np.abs(vectors).max(axis=-1, keepdims=True))[1]
-    scaled = np.ldexp(vectors, -exponents)
-    length = np.linalg.norm(scaled, axis=-1, keepdims=True)
+    x, y, z = (np.abs(vectors[..., k, None]) for k in range(3))  # much faster than along an axis of three
+    scaled = np.ldexp(vectors, -np.frexp(np.maximum(np.maximum(x, y), z))[1])
+    x, y, z = (scaled[..., k, None] for k in range(3))
+    length = np.sqrt(x * x + y * y + z * z)
     return scaled / np.where(length > 0, length, 1)
 
 
