@@ -49,9 +49,9 @@ def sphere(number: int, shape: ShapeRecord, around: Surroundings) -> Ball:
 
 
 def mesh(number: int, shape: ShapeRecord, around: Surroundings) -> Triangles:
-    """The triangles but for the degenerate ones, which the tracer never hits."""
+    """The triangles but for the degenerate ones and for repetitions, which the tracer never hits."""
     placed = around.meshes[number]
-    kept = np.flatnonzero(placed.normals.any(axis=1))
+    kept = np.flatnonzero(~(placed.degenerate | placed.repeated))
     smooth = placed.corner_normals[kept] if inherited(around.scene, shape, "smooth") else None
     return Triangles(placed.corners[kept], kept, smooth)
 

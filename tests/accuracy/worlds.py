@@ -182,6 +182,29 @@ def _meshes(smooth: bool, file: str, **keys: Any) -> Table:
     return _with_shapes(shapes)
 
 
+def _ugly_mesh() -> Table:
+    """Glass letters L: concave, with a corner on a straight edge, among triangles without area; all faces
+    twice, the quads also wound the other way round."""
+    outline = [[0, 0], [2, 0], [2, 0.5], [0.5, 0.5], [0.5, 3], [0.25, 3], [0, 3]]
+    n = len(outline)
+    vertices = [[x, y, z] for z in (0.0, 0.7) for x, y in outline]
+    sides = [[k, (k + 1) % n, n + (k + 1) % n, n + k] for k in range(n)]
+    faces = [[0, 1, 1], list(range(n))[::-1], list(range(n, 2 * n)), *sides, [4, 5, 6]]
+    faces = [*faces, *faces, *[[a, d, c, b] for a, b, c, d in sides]]
+    letter = {"kind": "mesh", "name": "letter", "vertices": vertices, "faces": faces, "material": "glass"}
+    shapes = [
+        letter | {"translate": [-2.5, 0.4, 0.4], "rotate": [0.0, 20.0, 0.0]},
+        {
+            "kind": "instance",
+            "of": "letter",
+            "translate": [1, 0.2, 0.9],
+            "smooth": True,
+            "material": "mirror",
+        },
+    ]
+    return _with_shapes(shapes) | {"transparent_shadows": True}
+
+
 def _mirrors() -> Table:
     half = {"reflection": 1.0}
     table = room(max_depth=9, materials=MATERIALS | {"full": half})
@@ -280,6 +303,7 @@ FEATURES: dict[str, Callable[[], Table]] = {
     "flat meshes": lambda: _meshes(False, "ico.obj"),
     "smooth meshes": lambda: _meshes(True, "ico.obj"),
     "file normals": lambda: _meshes(True, "ico_normals.obj"),
+    "ugly mesh": _ugly_mesh,
     "smooth glass": lambda: _meshes(True, "ico.obj", material="glass"),
     "truncate": lambda: _textured(
         {"kind": "stripes", "colors": ["#ff0000", "#00ff00", "#2030ff"], "interval": 0.9, "index": "truncate"}
