@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tracer.acceleration.build import build_hierarchy
-from tracer.acceleration.layout import OCTANTS, threaded
+from tracer.acceleration.layout import threaded
 from tracer.acceleration.triangle import CONTACT_SLACK, TRIANGLE_WORDS
 from tracer.acceleration.walk import TriangleTables
 from tracer.backends import INVALID, Backend
@@ -98,25 +98,25 @@ def _triangle_tables(
 ) -> tuple[TriangleTables, np.ndarray]:
     """The triangles of all meshes in the order of the leaves, the tree over them, and the slot of each: -1
     for those that are left out, because they have no area or repeat one of their mesh."""
-    wanted = np.concatenate([mesh.in_hierarchy for mesh in meshes.values()])
+    wanted = np.flatnonzero(np.concatenate([mesh.in_hierarchy for mesh in meshes.values()]))
     corners = np.concatenate([mesh.corners for mesh in meshes.values()])[wanted]
-    normals = np.concatenate([mesh.normals for mesh in meshes.values()])[wanted]
+    hierarchy = build_hierarchy(backend, corners)
+    order = wanted[hierarchy.order]
+    rows = np.zeros((len(order), TRIANGLE_WORDS), backend.dtype)
+    rows[:, :9] = corners.reshape(-1, 9)[hierarchy.order]
+    rows[:, 9:12] = np.concatenate([mesh.normals for mesh in meshes.values()])[order]
     primitives = np.concatenate([np.arange(len(mesh.corners)) + first[i] for i, mesh in meshes.items()])[
-        wanted
+        order
     ]
-    hierarchy = build_hierarchy(corners)
-    rows = np.zeros((len(corners), TRIANGLE_WORDS))
-    rows[:, :9], rows[:, 9:12] = corners.reshape(-1, 9), normals
     rows[:, 12], rows[:, 13] = primitives >> 16, primitives & 0xFFFF
-    nodes = threaded(hierarchy)
     tables = TriangleTables(
-        triangles=backend.table(rows[hierarchy.order]),
-        nodes=backend.single_table(nodes),
-        count=backend.opaque_id(len(nodes) // OCTANTS),
-        extent=backend.opaque(np.abs(corners).max()),
+        triangles=backend.table(rows),
+        nodes=threaded(backend, hierarchy),
+        count=backend.opaque_id(len(hierarchy.left)),
+        extent=backend.opaque(max(-hierarchy.lower[0].min(), hierarchy.upper[0].max())),
     )
-    slots = np.full(len(wanted), -1)
-    slots[np.flatnonzero(wanted)[hierarchy.order]] = np.arange(len(corners))
+    slots = np.full(sum(len(mesh.corners) for mesh in meshes.values()), -1)
+    slots[order] = np.arange(len(order))
     return tables, slots
 
 

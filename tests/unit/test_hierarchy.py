@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,8 +13,10 @@ import tracer
 from tests.accuracy.probe import directions, rotation, unit
 from tests.accuracy.worlds import icosphere
 from tracer import device_meshes
-from tracer.acceleration.build import LARGEST_LEAF, Hierarchy, build_hierarchy
+from tracer.acceleration.build import Hierarchy, build_hierarchy
 from tracer.acceleration.layout import NODE_WORDS, OCTANTS, threaded
+from tracer.acceleration.subtrees import LARGEST_LEAF, LARGEST_SUBTREE, NODE_COST
+from tracer.backends import Backend, find_backend, thread_count
 
 Array = np.ndarray
 
@@ -59,12 +62,33 @@ MESHES: dict[str, Callable[[], Array]] = {
     "far": lambda: single(soup(2, 200) + 1e6),
     "doubling": sorted_apart,
     "icosphere": lambda: single((lambda mesh: mesh[0][mesh[1]])(icosphere(3))),
+    # Beyond a small subtree, where nodes are cut by other kernels.
+    "subtree": lambda: soup(8, LARGEST_SUBTREE),
+    "subtree and one": lambda: soup(8, LARGEST_SUBTREE + 1),
+    "two chunks and one": lambda: soup(8, 2 * LARGEST_SUBTREE + 1),
+    "same triangle often": lambda: np.repeat(soup(1, 1), 2 * LARGEST_SUBTREE + 3, axis=0),
+    "same centroid often": lambda: single(
+        np.arange(1, 601)[:, None, None] * [[1.0, 1, 1], [-1, 0, 1], [0, -1, -1]]
+    ),
+    "two places": lambda: np.repeat(soup(1, 2), [700, 300], axis=0),
+    "one far away": lambda: single(np.concatenate([soup(2, 500), soup(2, 1) + 1e6])),
+    "stack of walls": lambda: single(
+        np.concatenate([soup(k, 60) * [1, 1, 0] + [0, 0, k] for k in range(12)])
+    ),
+    "huge, large": lambda: single(soup(2, 500) * 1e37),
+    "smallest, large": lambda: single(soup(2, 500) * 1e-44),
+    "zero": lambda: np.zeros((300, 3, 3)),
 }
 
 
 def built(name: str) -> tuple[Array, Hierarchy]:
     corners = MESHES[name]()
-    return corners, build_hierarchy(corners)
+    return corners, build_hierarchy(find_backend(), corners)
+
+
+def lists(tree: Hierarchy) -> Array:
+    """The layout (8 n, NODE_WORDS) on this side."""
+    return threaded(find_backend(), tree).numpy().reshape(-1, NODE_WORDS)
 
 
 @pytest.mark.parametrize("name", MESHES)
@@ -111,6 +135,71 @@ def test_the_tree_is_not_deep() -> None:
     assert len(built("doubling")[1].levels) <= 60
 
 
+def test_large_nodes_of_equal_centroids_are_halved() -> None:
+    assert len(built("same triangle often")[1].levels) <= 9
+    assert len(built("zero")[1].levels) <= 9
+
+
+def bytes_of(tree: Hierarchy) -> bytes:
+    parts = (tree.lower, tree.upper, tree.left, tree.first, tree.count, tree.order)
+    return b"".join(np.ascontiguousarray(part).tobytes() for part in parts)
+
+
+def test_every_run_thread_count_and_precision_gives_the_same_tree() -> None:
+    corners = soup(11, 3000)
+    first = bytes_of(build_hierarchy(find_backend("llvm"), corners))
+    for threads in (1, 2, 3):
+        with thread_count(threads):
+            for precision in ("single", "double"):
+                backend = find_backend("llvm", precision)
+                assert bytes_of(build_hierarchy(backend, corners)) == first
+
+
+def half_area(boxes: Array) -> Array:
+    """Half of the areas of boxes (..., 2, 3)."""
+    x, y, z = np.moveaxis(boxes[..., 1, :] - boxes[..., 0, :], -1, 0)
+    return x * y + y * z + z * x
+
+
+def expected_cost(tree: Hierarchy) -> float:
+    """Node visits and triangle tests of a ray that meets the root, by the surface area heuristic."""
+    areas = half_area(np.stack([tree.lower, tree.upper], axis=1).astype(float))
+    return float((areas * np.where(tree.left > 0, NODE_COST, tree.count)).sum() / areas[0])
+
+
+def plain_cost(boxes: Array) -> float:
+    """The same times the root's area for triangles with `boxes` (n, 2, 3), cut the plain way: node by node,
+    every cut between two of 16 bins on each axis tried."""
+    n, area = len(boxes), half_area(np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)]))
+    center = boxes.mean(axis=1)
+    low, size = center.min(axis=0), np.ptp(center, axis=0)
+    least, best = np.inf, np.arange(n) < n // 2
+    for axis in np.flatnonzero(size > 0):
+        bins = np.minimum(np.floor((center[:, axis] - low[axis]) * (16 / size[axis])), 15)
+        for place in range(1, 16):
+            sides = [boxes[bins < place], boxes[bins >= place]]
+            if min(map(len, sides)) == 0:
+                continue
+            tops = [np.stack([side[:, 0].min(axis=0), side[:, 1].max(axis=0)]) for side in sides]
+            cost = sum(len(side) * float(half_area(top)) for side, top in zip(sides, tops, strict=True))
+            if cost < least:
+                least, best = cost, bins < place
+    if n == 1 or (n <= LARGEST_LEAF and least + NODE_COST * area >= n * area):
+        return float(n * area)
+    return NODE_COST * float(area) + plain_cost(boxes[best]) + plain_cost(boxes[~best])
+
+
+@pytest.mark.parametrize(
+    "name", ["soup", "far", "icosphere", "pairs", "stack of walls", "two chunks and one"]
+)
+def test_the_tree_is_as_good_as_one_cut_node_by_node(name: str) -> None:
+    """Rounding may send a triangle to the next bin, or decide between two cuts that cost the same."""
+    corners, tree = built(name)
+    boxes = np.stack([corners.min(axis=1), corners.max(axis=1)], axis=1)
+    root = half_area(np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)]))
+    assert expected_cost(tree) == pytest.approx(plain_cost(boxes) / root, rel=0.02)
+
+
 def walked(nodes: Array, octant: int, crosses: Callable[[Array], bool]) -> list[int]:
     """The nodes that a kernel visits, by place in the table."""
     count = len(nodes) // OCTANTS
@@ -127,7 +216,7 @@ def walked(nodes: Array, octant: int, crosses: Callable[[Array], bool]) -> list[
 @pytest.mark.parametrize("name", MESHES)
 def test_a_walk_through_all_boxes_meets_each_leaf_once(name: str) -> None:
     corners, tree = built(name)
-    nodes = threaded(tree)
+    nodes = lists(tree)
     assert nodes.shape == (OCTANTS * len(tree.left), NODE_WORDS) and nodes.dtype == np.float32
     for octant in range(OCTANTS):
         visited = walked(nodes, octant, lambda _: True)
@@ -140,7 +229,7 @@ def test_a_walk_through_all_boxes_meets_each_leaf_once(name: str) -> None:
 @pytest.mark.parametrize("name", MESHES)
 def test_a_walk_that_misses_the_root_ends_there(name: str) -> None:
     _, tree = built(name)
-    nodes = threaded(tree)
+    nodes = lists(tree)
     for octant in range(OCTANTS):
         assert walked(nodes, octant, lambda _: False) == [octant * len(tree.left)]
 
@@ -149,7 +238,7 @@ def test_a_walk_that_misses_the_root_ends_there(name: str) -> None:
 def test_a_missed_box_is_left_out_with_all_below_it_and_nothing_else(name: str) -> None:
     """Any one box missed: the triangles below it are left out, in every octant."""
     corners, tree = built(name)
-    nodes = threaded(tree)
+    nodes = lists(tree)
     rng = np.random.default_rng(1)
     for node in rng.integers(len(tree.left), size=4):
         box = np.array([tree.lower[node], tree.upper[node]], np.float32)
@@ -176,8 +265,8 @@ def test_rays_of_an_octant_meet_the_nearer_child_first() -> None:
     """Two heaps far apart: whichever an octant's rays meet first comes first in its list."""
     for axis in range(3):
         corners = np.concatenate([soup(1, 20), soup(2, 20) + 10.0 * np.eye(3)[axis]])
-        tree = build_hierarchy(single(corners))
-        nodes = threaded(tree)
+        tree = build_hierarchy(find_backend(), single(corners))
+        nodes = lists(tree)
         for octant in range(OCTANTS):
             second = nodes[octant * len(tree.left) + 1]
             near_origin = min(second[axis], second[4 + axis]) < 5
@@ -303,10 +392,10 @@ def leaf_one_short(nodes: Array) -> None:
 
 @pytest.mark.parametrize("damage", [jump_too_far, boxes_too_small, planes_swapped, leaf_one_short])
 def test_planted_error_is_caught(damage: Callable[[Array], None], monkeypatch: pytest.MonkeyPatch) -> None:
-    def damaged(tree: Hierarchy) -> Array:
-        nodes = threaded(tree)
+    def damaged(backend: Backend, tree: Hierarchy) -> Any:
+        nodes = lists(tree).copy()
         damage(nodes)
-        return nodes
+        return backend.single_table(nodes)
 
     monkeypatch.setattr(device_meshes, "threaded", damaged)
     with pytest.raises(AssertionError):

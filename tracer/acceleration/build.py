@@ -1,33 +1,33 @@
 """Builds the bounding volume hierarchy over all triangles, by the surface area heuristic.
 
-Top down, all nodes of a level at once in vectorized NumPy: the centroids of a node's triangles fall into 16
-bins on each axis, and the node is cut between the two bins where the expected cost is least (Wald, On Fast
-Construction of SAH-based Bounding Volume Hierarchies, 2007). The root is the bounding box of the document's
-section 5.
+Top down: the centroids of a node's triangles fall into 16 bins on each axis, and the node is cut between the
+two bins where the expected cost is least (Wald, On Fast Construction of SAH-based Bounding Volume
+Hierarchies, 2007). Large nodes are cut a level at a time, with a lane for every chunk of triangles
+(`bins.py`); small ones down to the leaves, with a lane for each (`subtrees.py`). The kernels only decide
+which triangles go where; boxes are made of the corners themselves, so that they are exact on every backend.
+The root is the bounding box of the document's section 5.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-BINS = 16
-
-LARGEST_LEAF = 4
-"""Triangles of a leaf at most; fewer where cutting is cheaper. The layout has room for 7."""
-
-NODE_COST = 1.0
-"""Cost of visiting a node, in tests of a triangle."""
+from tracer.acceleration.bins import BOX_WORDS
+from tracer.acceleration.large_nodes import cut_large_nodes
+from tracer.acceleration.subtrees import build_subtrees
+from tracer.backends import Backend, exact_arithmetic
 
 
 @dataclass(frozen=True)
 class Hierarchy:
-    """A binary tree of n nodes, parents before children, the root first.
+    """A binary tree of n nodes, level by level, the root first.
 
-    `lower`, `upper` (n, 3): boxes; `left` (n,): left child, the right one follows it, 0 for a leaf; `first`,
-    `count` (n,): a leaf's triangles are `order[first : first + count]`; `levels`: where each level of nodes
-    ends.
+    `lower`, `upper` (n, 3) float32: boxes; `left` (n,): left child, the right one follows it, 0 for a leaf;
+    `first`, `count` (n,): the triangles below a node are `order[first : first + count]`; `levels`: where each
+    level of nodes ends.
     """
 
     lower: np.ndarray
@@ -39,122 +39,86 @@ class Hierarchy:
     levels: list[int]
 
 
-@dataclass
-class _Triangles:
-    """Boxes and centroids of all triangles (n, 3)."""
-
-    lower: np.ndarray
-    upper: np.ndarray
-    center: np.ndarray
-
-
-def build_hierarchy(corners: np.ndarray) -> Hierarchy:
-    """The hierarchy of n >= 1 triangles with `corners` (n, 3, 3).
+def build_hierarchy(backend: Backend, corners: np.ndarray) -> Hierarchy:
+    """The hierarchy of n >= 1 triangles with `corners` (n, 3, 3) in single precision numbers.
 
     Degenerate triangles may be among them: the triangle test never accepts them.
     """
-    n = len(corners)
-    lower, upper = corners.min(axis=1), corners.max(axis=1)
-    triangles = _Triangles(lower, upper, lower + (upper - lower) / 2)
-    order = np.arange(n)
-    boxes = np.empty((2, 2 * n - 1, 3))
-    left, first, count = (np.zeros(2 * n - 1, np.int64) for _ in range(3))
-    count[0] = n
-    begin, end, levels = 0, 1, [1]
-    while begin < end:
-        nodes = np.arange(begin, end)
-        members = _Members(first[nodes], count[nodes])
-        ids = order[members.places]
-        boxes[0, nodes] = np.minimum.reduceat(lower[ids], members.offsets)
-        boxes[1, nodes] = np.maximum.reduceat(upper[ids], members.offsets)
-        in_left, cut = _cut(triangles, ids, members, boxes[:, nodes])
-        # Members of a cut node: those of the left child first, otherwise in the order they had.
-        sizes = members.sums(in_left)
-        order[members.partitioned(in_left, sizes)] = ids
-        cut_nodes, sizes = nodes[cut], sizes[cut]
-        left[cut_nodes] = end + 2 * np.arange(len(cut_nodes))
-        children = left[cut_nodes]
-        first[children], count[children] = first[cut_nodes], sizes
-        first[children + 1], count[children + 1] = first[cut_nodes] + sizes, count[cut_nodes] - sizes
-        begin, end = end, end + 2 * len(cut_nodes)
-        levels.append(end)
-    return Hierarchy(boxes[0, :end], boxes[1, :end], left[:end], first[:end], count[:end], order, levels[:-1])
+    a, b, c = (corners[:, k].astype(np.float32) for k in range(3))
+    lower, upper = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    with exact_arithmetic():
+        table = backend.single_table(_box_rows(lower, upper))
+        table, top, first, count = cut_large_nodes(backend, table, len(corners))
+        found = build_subtrees(backend, table, backend.id_table(first), backend.id_table(count))
+        left, leaf, slots = (x.numpy().astype(np.int64) for x in found)
+    numbers = table.numpy().view(np.uint32).reshape(-1, BOX_WORDS)[:, 6]
+    left, leaf, root = _with_top(left, leaf, top)
+    nodes, children, levels = _by_level(left, root)
+    order = numbers[slots].astype(np.int64)
+    return _with_boxes(lower[order], upper[order], order, leaf[nodes], children, levels)
 
 
-class _Members:
-    """The triangles of some nodes, laid end to end: `places` in the order, `node` number among these
-    nodes."""
-
-    def __init__(self, first: np.ndarray, count: np.ndarray) -> None:
-        self.count = count
-        self.offsets = np.cumsum(count) - count
-        self.node = np.repeat(np.arange(len(count)), count)
-        self.first = first
-        self.places = np.arange(len(self.node)) + (first - self.offsets)[self.node]
-
-    def sums(self, mask: np.ndarray) -> np.ndarray:
-        """How many members of each node are in the mask."""
-        return np.bincount(self.node[mask], minlength=len(self.count))
-
-    def partitioned(self, in_left: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-        """New places: the members in the mask before the others of their node."""
-        before = np.cumsum(in_left) - in_left  # members in the mask before this one, over all nodes
-        rank_left = before - before[self.offsets][self.node]
-        rank_right = np.arange(len(before)) - self.offsets[self.node] - rank_left + sizes[self.node]
-        return self.first[self.node] + np.where(in_left, rank_left, rank_right)
+def _box_rows(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Boxes for the kernels: scaled by a power of two so that coordinates are below 1, and numbered."""
+    rows = np.empty((len(lower), BOX_WORDS), np.float32)
+    largest = max(np.abs(lower).max(), np.abs(upper).max())
+    exponent = -int(np.frexp(largest)[1])
+    rows[:, 0:3], rows[:, 3:6] = np.ldexp(lower, exponent), np.ldexp(upper, exponent)
+    rows.view(np.uint32)[:, 6] = np.arange(len(rows))
+    return rows
 
 
-def _cut(
-    triangles: _Triangles, ids: np.ndarray, members: _Members, boxes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Which members go to the left child, and which nodes are cut at all."""
-    center = triangles.center[ids]
-    low = np.minimum.reduceat(center, members.offsets)
-    extent = np.maximum.reduceat(center, members.offsets) - low
-    scale = np.divide(BINS, extent, out=np.zeros_like(extent), where=extent > 0)
-    bins = ((center - low[members.node]) * scale[members.node]).astype(np.int64)
-    bins = np.minimum(bins, BINS - 1)
-    costs = np.stack([_costs(triangles, ids, members, bins[:, axis]) for axis in range(3)], axis=1)
-    flat = costs.reshape(len(costs), -1)
-    best = flat.argmin(axis=1)
-    least = flat[np.arange(len(flat)), best]
-    axis, place = np.divmod(best, BINS - 1)
-    in_left = bins[np.arange(len(bins)), axis[members.node]] <= place[members.node]
-    # Where all centroids coincide no bin tells triangles apart: half and half.
-    rank = np.arange(len(ids)) - members.offsets[members.node]
-    in_left = np.where(np.isinf(least)[members.node], rank < members.count[members.node] // 2, in_left)
-    area = _half_area(boxes[1] - boxes[0])
-    dearer = least + NODE_COST * area >= members.count * area
-    cut = (members.count > LARGEST_LEAF) | ((members.count > 1) & ~dearer)
-    return in_left, cut
+def _with_top(left: np.ndarray, leaf: np.ndarray, top: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """The nodes of the subtrees, then those `top` (n,) above them: for a large node its left child among
+    these, for the root of a subtree -1 - its place. Returns `left`, `leaf` and the place of the root."""
+    root = len(left)
+    is_large = top >= 0
+    place = np.where(is_large, 0, -1 - top)
+    above = np.where(is_large, root + top, left[place])
+    return np.concatenate([left, above]), np.concatenate([leaf, np.where(is_large, 0, leaf[place])]), root
 
 
-def _costs(triangles: _Triangles, ids: np.ndarray, members: _Members, bins: np.ndarray) -> np.ndarray:
-    """(nodes, BINS - 1): area times triangles of both sides, added up, for a cut after each bin but the last;
-    infinite where one side is empty."""
-    nodes = len(members.count)
-    key = members.node * BINS + bins
-    count = np.bincount(key, minlength=nodes * BINS).reshape(nodes, BINS)
-    low, high = np.full((3, nodes * BINS), np.inf), np.full((3, nodes * BINS), -np.inf)
-    for axis in range(3):
-        np.minimum.at(low[axis], key, triangles.lower[ids, axis])
-        np.maximum.at(high[axis], key, triangles.upper[ids, axis])
-    boxes = low.reshape(3, nodes, BINS), high.reshape(3, nodes, BINS)
-    left = _growing(count, *boxes)
-    right = _growing(count[:, ::-1], *(box[..., ::-1] for box in boxes))
-    return left[:, :-1] + right[:, -2::-1]
+def _by_level(left: np.ndarray, root: int) -> tuple[np.ndarray, np.ndarray, list[int]]:
+    """Places of the nodes level by level, the left child of each by its number among these (0: a leaf), and
+    where levels end."""
+    level, nodes, children, levels = np.array([root]), [], [], [1]
+    while len(level):
+        below = left[level]
+        inner = below > 0
+        number = levels[-1] + 2 * (inner.cumsum() - 1)
+        nodes.append(level)
+        children.append(np.where(inner, number, 0))
+        level = (below[inner, None] + [0, 1]).ravel()
+        levels.append(levels[-1] + len(level))
+    return np.concatenate(nodes), np.concatenate(children), levels[:-1]
 
 
-def _growing(count: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """(nodes, BINS) area times triangles of the first bins: of one, of two, ...; infinite where they are
-    empty."""
-    number = np.cumsum(count, axis=1)
-    size = np.maximum.accumulate(high, axis=2) - np.minimum.accumulate(low, axis=2)
-    area = _half_area(np.moveaxis(np.where(number > 0, size, 0), 0, -1))
-    return np.where(number > 0, area * number, np.inf)
-
-
-def _half_area(size: np.ndarray) -> np.ndarray:
-    """xy + yz + zx of extents (..., 3)."""
-    x, y, z = size[..., 0], size[..., 1], size[..., 2]
-    return x * y + y * z + z * x
+def _with_boxes(
+    lower: np.ndarray,
+    upper: np.ndarray,
+    order: np.ndarray,
+    leaf: np.ndarray,
+    left: np.ndarray,
+    levels: list[int],
+) -> Hierarchy:
+    """The hierarchy of triangles with boxes `lower`, `upper` (m, 3) in its order; `leaf`: as in
+    `build_subtrees`."""
+    first, count = leaf >> 3, leaf & 7
+    boxes = np.empty((2, len(left), 3), np.float32)
+    leaves = np.flatnonzero(count)
+    starts = np.zeros(len(order), bool)
+    starts[first[leaves]] = True
+    rank = (starts.cumsum() - 1)[first[leaves]]
+    starts = np.flatnonzero(starts)
+    boxes[0, leaves] = np.minimum.reduceat(lower, starts)[rank]
+    boxes[1, leaves] = np.maximum.reduceat(upper, starts)[rank]
+    for begin, end in list(pairwise([0, *levels]))[::-1]:
+        nodes = begin + np.flatnonzero(left[begin:end])
+        if len(nodes):
+            below = slice(end, end + 2 * len(nodes))
+            pairs = boxes[:, below]
+            boxes[0, nodes] = np.minimum(pairs[0, 0::2], pairs[0, 1::2])
+            boxes[1, nodes] = np.maximum(pairs[1, 0::2], pairs[1, 1::2])
+            first[nodes] = first[below][0::2]
+            count[nodes] = count[below][0::2] + count[below][1::2]
+    return Hierarchy(boxes[0], boxes[1], left, first, count, order, levels)
