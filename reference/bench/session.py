@@ -18,7 +18,7 @@ from reference.bench.report import page_of, summary_of
 from reference.bench.scenes import Workshop
 from reference.report.header import COMMAND, machine_facts
 from tracer.backends import thread_count
-from tracer.errors import OutputError
+from tracer.errors import MachineError, OutputError
 from tracer.film.atomic import atomic_write, check_writable
 
 PAGE, TWIN = "index.html", "index.json"
@@ -106,10 +106,20 @@ def run(request: Request, progress: Progress, check: Check) -> Benchmark:
         results: list[tuple[Step, Result]] = []
         with thread_count(request.threads):
             for step in steps:
-                results.append((step, step.run()))
+                results.append((step, _result(step, check)))
                 progress(sum(done.weight for done, _ in results), sum(each.weight for each in steps), step)
                 check()
     return _gathered(request, chosen, results, [*missing.values(), *_left_out(request)])
+
+
+def _result(step: Step, check: Check) -> Result:
+    """What a step finds. Ctrl-C reaches the processes of other renderers, too: that they fail is then no
+    error."""
+    try:
+        return step.run()
+    except MachineError:
+        check()
+        raise
 
 
 def _gathered(

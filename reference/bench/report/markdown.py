@@ -10,6 +10,12 @@ from reference.bench.report.headline import headline_of
 from reference.bench.report.units import NOTHING, duration, mebibytes, million, ratio
 from reference.report.header import COMMAND
 
+READING = (
+    "Times are medians of interleaved rounds in one run, minima in parentheses; other work on the machine "
+    "moves them, so quote the ratios. A ratio above 1 means that tracer is faster. Frames are traced only: "
+    "reading, hierarchies and processes are in tables of their own."
+)
+
 
 def summary_of(benchmark: Benchmark) -> str:
     """Headline, a table a group, rays a second, builds, what was left out, with what it was made."""
@@ -19,7 +25,7 @@ def summary_of(benchmark: Benchmark) -> str:
         "",
         *(f"- **{ratio(each.value)}** {each.words}" for each in headline_of(benchmark)),
     ]
-    lines += ["", *_plain(READING)]
+    lines += ["", READING]
     for group in benchmark.groups:
         lines += ["", f"## {group.title}", "", *_table(group)]
     if any(point.processes for group in benchmark.groups for point in group.points):
@@ -34,17 +40,6 @@ def summary_of(benchmark: Benchmark) -> str:
     if COMMAND in benchmark.header:
         lines += ["", f"To repeat it:\n\n    {benchmark.header[COMMAND]}"]
     return "\n".join(lines) + "\n"
-
-
-READING = (
-    "Times are medians of interleaved rounds in one run, minima in parentheses; other work on the machine "
-    "moves them, so quote the ratios. A ratio above 1 means that tracer is faster. Frames are traced only: "
-    "reading, hierarchies and processes are in tables of their own.",
-)
-
-
-def _plain(sentences: Sequence[str]) -> list[str]:
-    return list(sentences)
 
 
 def _table(group: Group) -> Iterator[str]:
