@@ -167,10 +167,11 @@ TOLERANCES: dict[str, Tolerance] = {
         "4",
     ),
     "left out": Tolerance(
-        0.01,
+        0.04,
         "share",
         "rays that agree on what they hit but graze its rim or edge, or start next to a neighbor: there a "
-        "distance, a side or a normal means nothing",
+        "distance, a side or a normal means nothing; 2 % of the free rays are aimed within 1e-4 r of "
+        "silhouettes, and in the band of a small sphere all of them; measured up to 2.4 %",
         "measured",
     ),
     "mitsuba sphere": Tolerance(

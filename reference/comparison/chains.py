@@ -15,13 +15,16 @@ from reference.comparison.judge import SINGLE, guilty_side, replay, samples
 from reference.comparison.kinds import has_shapes
 from reference.comparison.rays import StepRays
 from reference.comparison.records import Growth, Outcome, Term
-from reference.comparison.steps import chains, step_length
+from reference.comparison.steps import Chains, chains, step_length
 from reference.tolerances import TOLERANCES
 
 Array = np.ndarray
 
 ENOUGH = 20
 """A median of fewer chains says nothing."""
+
+MOST = 10_000
+"""Chains that run freely, at most: more do not move a median."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +39,17 @@ class Gaps:
     gain: Array
 
 
+def free_chains(case: Case) -> Chains:
+    """A part of our chains."""
+    every = chains(case)
+    return every.part(np.arange(0, len(every.rays), 1 + len(every.rays) // MOST))
+
+
 def mitsuba_chains(case: Case) -> tuple[Array, Array, Array]:
     """Mitsuba's chains from vertex to vertex of its own: positions (n, k, 3), shapes and primitives (n, k),
     NaN and -1 where a chain has ended."""
-    truth, rays = case.bench.truth, chains(case).rays
-    refracts = chains(case).refracts
+    truth, ours = case.bench.truth, free_chains(case)
+    rays, refracts = ours.rays, ours.refracts
     n, length = refracts.shape
     position, shape, primitive = np.full((n, length, 3), np.nan), *np.full((2, n, length), -1)
     o, d, going = rays.o, rays.d, np.arange(n)
@@ -73,8 +82,8 @@ def _bent(d: Array, facing: Array, entering: Array, ior: Array, refracts: Array)
 def exact_chains(case: Case, same: Array) -> Array:
     """(n, k, 3) vertices of the chains in extended precision, rounded to doubles, along the primitives that
     our chains reach, as far as `same` (n, k) says."""
-    truth, (rays, path) = case.bench.truth, (chains(case).rays, chains(case).path)
-    refracts = chains(case).refracts
+    truth, ours = case.bench.truth, free_chains(case)
+    rays, path, refracts = ours.rays, ours.path, ours.refracts
     position = np.full((*same.shape, 3), np.nan)
     k, o, d = np.arange(len(rays)), extended.number(rays.o), extended.unit(rays.d)
     left = np.full(len(k), -1)
@@ -97,7 +106,8 @@ def exact_chains(case: Case, same: Array) -> Array:
 
 def gaps(case: Case) -> Gaps:
     """How far apart the chains are, vertex by vertex."""
-    truth, (rays, path) = case.bench.truth, (chains(case).rays, chains(case).path)
+    truth, ours = case.bench.truth, free_chains(case)
+    rays, path = ours.rays, ours.path
     theirs, shape, primitive = mitsuba_chains(case)
     same = (path.shape == shape) & (path.primitive == primitive) & (path.shape >= 0)
     same = np.cumprod(same, axis=1) == 1
@@ -127,7 +137,7 @@ def gaps(case: Case) -> Gaps:
 def compare_growth(case: Case) -> Outcome:
     """The distance between both tracers' vertices while they reach the same primitives, in units of what a
     bounce may do to an error: 1 + 2 t / (r cos) each. Its median, vertex by vertex."""
-    found, ours = gaps(case), chains(case)
+    found, ours = gaps(case), free_chains(case)
     ratios = [found.between / SINGLE, found.ours / case.epsilon, found.mitsuba / SINGLE]
     between, own, other = (ratio / found.gain for ratio in ratios)
     growth = tuple(

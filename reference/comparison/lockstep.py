@@ -12,7 +12,8 @@ from reference.comparison.hits import off_surface, rim_clearance
 from reference.comparison.judge import SINGLE, Numbers, bounds, judge_numbers
 from reference.comparison.kinds import by_kind, has_shapes
 from reference.comparison.records import Outcome, Term
-from reference.comparison.steps import agreed_steps, is_near, parted, steps
+from reference.comparison.steps import Steps, agreed_steps, is_near, parted, steps
+from reference.comparison.truth import SPHERE, Truth
 from reference.tolerances import TOLERANCES
 
 Array = np.ndarray
@@ -31,9 +32,10 @@ def compare_next_hit(case: Case) -> Outcome:
         return Answers(*truth.nearest(s.o[k], s.d[k], (s.left[k], s.left_primitive[k])))
 
     def distance(k: Array) -> Array:
-        """Also half of how far apart the two hits are: where two surfaces meet both may be right."""
+        """Also half of how far apart the two hits are, where two surfaces meet and both may be right; and by
+        how much a ray that leaves a sphere grazes it."""
         both = (s.shape[k] >= 0) & (s.theirs_shape[k] >= 0)
-        off = tie_or_edge(case, s.rays, k, ours, theirs)
+        off = np.minimum(tie_or_edge(case, s.rays, k, ours, theirs), rim_left(truth, s.part(k)))
         return np.where(both, np.minimum(off, np.abs(ours_t - theirs_t)[k] / 2), off)
 
     def starts(k: Array) -> Array:
@@ -53,6 +55,17 @@ def compare_next_hit(case: Case) -> Outcome:
         apart=parted(case, s),
     )
     return judge_ids(case, "lockstep, next hit", asked)
+
+
+def rim_left(truth: Truth, s: Steps) -> Array:
+    """(n,) how far the rim of the sphere that a ray leaves is from its line; infinite for other shapes."""
+    gap = np.full(len(s), np.inf)
+    k = np.flatnonzero((s.left >= 0) & (truth.kind[s.left] == SPHERE))
+    row = truth.rows[s.left[k]]
+    way = s.d[k] / np.linalg.norm(s.d[k], axis=1, keepdims=True)
+    closest = np.linalg.norm(np.cross(s.o[k] - row[:, :3], way), axis=1)
+    gap[k] = np.abs(row[:, 3] - closest)
+    return gap
 
 
 def compare_next_vertex(case: Case, kind: str) -> Outcome:

@@ -44,6 +44,11 @@ class Chains:
     refracts: Array
     path: tracer.Paths
 
+    def part(self, k: Array) -> Chains:
+        """Some of the chains, by number."""
+        path = tracer.Paths(**{name: column[k] for name, column in vars(self.path).items()})
+        return Chains(self.rays.part(k), self.events[k], self.refracts[k], path)
+
 
 @dataclass(frozen=True)
 class Steps:

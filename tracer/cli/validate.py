@@ -116,7 +116,7 @@ def request_of(scenes: tuple[str, ...], **options: Any) -> Request:
     mitsuba()
     try:
         from reference.session import Request
-    except ImportError as error:
+    except ModuleNotFoundError as error:
         raise MachineError(
             f"{error.name} is not installed; `pip install whitted-tracer[reference]` installs all that "
             "`tracer validate` needs"
