@@ -13,6 +13,7 @@ import tracer
 from tests.accuracy.probe import directions, rotation, unit
 from tests.accuracy.worlds import icosphere
 from tracer import device_meshes
+from tracer.acceleration import traverse
 from tracer.acceleration.build import Hierarchy, build_hierarchy
 from tracer.acceleration.layout import NODE_WORDS, OCTANTS, threaded
 from tracer.acceleration.subtrees import LARGEST_LEAF, LARGEST_SUBTREE, NODE_COST
@@ -370,6 +371,106 @@ def test_nearest_hits_at_the_ends_of_single_precision(scale: float) -> None:
     compare_with_all(single(soup(7, 40, 1.0) * scale), 3, 4000, "double")
 
 
+# ---- Boxes never decide ------------------------------------------------------------------------------------
+
+
+def slivers(seed: int, count: int) -> Array:
+    """Needles across the cube, far thinner than long."""
+    corners = soup(seed, count, 1.0)
+    corners[:, 2] = corners[:, 0] + 1e-5 * (corners[:, 2] - corners[:, 0])
+    return single(corners)
+
+
+def pile(seed: int) -> Array:
+    """Walls in planes across the axes, many of them in one plane, and boxes without thickness."""
+    rng = np.random.default_rng(seed)
+    walls = []
+    for axis in range(3):
+        wall = soup(seed + axis, 80, 1.0)
+        wall[..., axis] = rng.integers(-2, 3, (80, 1)) / 4
+        walls.append(wall)
+    return np.concatenate(walls)
+
+
+SOUPS: dict[str, Callable[[int], Array]] = {
+    "soup": lambda seed: soup(seed, 300, 1.0),
+    "fine soup": lambda seed: soup(seed, 600, 0.1),
+    "slivers": lambda seed: slivers(seed, 200),
+    "walls": pile,
+    "huge": lambda seed: single(soup(seed, 200, 1.0) * 1e15),
+    "tiny": lambda seed: single(soup(seed, 200, 1.0) * 1e-15),
+    "far": lambda seed: single(soup(seed, 200, 1.0) + 300),
+    "scales": lambda seed: np.concatenate([single(soup(seed + k, 60, 1.0) * 10.0**-k) for k in range(5)]),
+    "icosphere": lambda seed: single((lambda mesh: mesh[0][mesh[1]])(icosphere(2))),
+}
+
+
+def hard_rays(seed: int, n: int, corners: Array) -> tuple[Array, Array]:
+    """Towards corners and points of edges, within the planes of triangles, along axes, from corners."""
+    rng = np.random.default_rng(seed)
+    size = np.ptp(corners, axis=(0, 1)).max()
+    chosen = corners[rng.integers(len(corners), size=n)]
+    share = rng.uniform(0, 1, (n, 1)) * (rng.random((n, 1)) < 0.7)
+    target = chosen[:, 0] + share * (chosen[:, 1] - chosen[:, 0])
+    d = unit(directions(rng, n))
+    kind = rng.integers(4, size=n)
+    within = chosen[:, 2] - chosen[:, 0] + rng.uniform(-1, 1, (n, 1)) * (chosen[:, 1] - chosen[:, 0])
+    length = np.linalg.norm(within, axis=1)
+    grazing = (kind == 1) & (length > 0)
+    d[grazing] = within[grazing] / length[grazing, None]
+    along = rng.integers(3, size=n)
+    straight = np.where(
+        np.arange(3) == along[:, None], rng.choice([-1.0, 1.0], (n, 1)), rng.choice([0.0, -0.0], (n, 3))
+    )
+    d[kind == 2] = straight[kind == 2]
+    away = size * rng.uniform(0.1, 2, (n, 1)) * (kind < 3)[:, None]
+    return single(target - d * away), d
+
+
+def compare_with_open_boxes(corners: Array, seed: int, n: int, precision: str) -> None:
+    """Every ray: the hit is bit for bit that of the same tests on all triangles, no box missed."""
+
+    def opened(backend: Backend, tree: Hierarchy) -> Any:
+        nodes = lists(tree).copy()
+        for octant, rows in enumerate(np.split(nodes, OCTANTS)):
+            rows[:, :3] = [np.inf if octant >> k & 1 else -np.inf for k in range(3)]
+            rows[:, 4:7] = -rows[:, :3]
+        return backend.single_table(nodes)
+
+    scene = scene_of(corners)
+    for rays_of in (rays, hard_rays):
+        o, d = rays_of(seed, n, corners)
+        found = tracer.intersect(scene, o, d, precision=precision)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(device_meshes, "threaded", opened)
+            everything = tracer.intersect(scene, o, d, precision=precision)
+        assert 0.1 < everything.valid.mean()
+        different = (found.primitive != everything.primitive) | ((found.t != everything.t) & found.valid)
+        assert not different.any(), (
+            f"{int(different.sum())} of {n}: from {o[different][0]} along {d[different][0]}"
+        )
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+@pytest.mark.parametrize("name", SOUPS)
+def test_boxes_never_change_a_hit(name: str, precision: str) -> None:
+    compare_with_open_boxes(SOUPS[name](21), 4, 3000, precision)
+
+
+def test_grazing_hits_anywhere_along_the_ray_are_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(traverse, "GRAZING", 0.0)
+    with pytest.raises(AssertionError):
+        compare_with_open_boxes(SOUPS["soup"](21), 4, 3000, "single")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("precision", ["single", "double"])
+@pytest.mark.parametrize("name", SOUPS)
+def test_boxes_never_change_a_hit_of_many_soups(name: str, precision: str) -> None:
+    for seed in range(30, 34):
+        compare_with_open_boxes(SOUPS[name](seed), seed, 20_000, precision)
+
+
 def jump_too_far(nodes: Array) -> None:
     """Every other jump skips a node more."""
     bits, count = nodes.view(np.uint32), len(nodes) // OCTANTS
@@ -400,6 +501,8 @@ def test_planted_error_is_caught(damage: Callable[[Array], None], monkeypatch: p
     monkeypatch.setattr(device_meshes, "threaded", damaged)
     with pytest.raises(AssertionError):
         compare_with_all(RAY_MESHES["soup"](), 3, 4000, "double")
+    with pytest.raises(AssertionError):
+        compare_with_open_boxes(RAY_MESHES["soup"](), 3, 4000, "double")
 
 
 @pytest.mark.slow
