@@ -20,7 +20,7 @@ way."""
 
 GRAZING = 0.25
 """Hits at a smaller cosine than this stay within the box of their triangle. At larger ones the rounding of
-the distance is of the size by which boxes are widened; to keep all hits costs twice the time, 4 % of a ray."""
+the distance is of the size by which boxes are widened; keeping all hits costs 4 % of a ray, twice as much."""
 
 Visit = Callable[[Any, Any, Any, TriangleTest, Any], Any]
 """(state, distance, primitive id, the whole test, mask of a hit in front of the limit) -> state."""
