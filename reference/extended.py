@@ -126,6 +126,17 @@ def inside_triangle(p: Any, corners: Any) -> np.ndarray:
     return np.asarray(sides[0] & sides[1] & sides[2])
 
 
+def barycentrics(p: Any, corners: Any) -> Extended:
+    """(n, 3) weights of the corners at points of triangles (n, 3, 3)."""
+    corners = number(corners)
+    a, b, c = (corners[..., k, :] for k in range(3))
+    normal = cross(b - a, c - a)
+    area = dot(normal, normal)
+    second = dot(cross(p - a, c - a), normal) / area
+    third = dot(cross(b - a, p - a), normal) / area
+    return np.stack([1 - second - third, second, third], axis=-1)
+
+
 def mirror(d: Any, n: Any) -> Extended:
     """r = d - 2 (n.d) n for unit n (document, section 3)."""
     return number(d) - 2 * dot(n, d)[..., None] * number(n)

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 import tracer
-from reference.comparison import grazing
 from reference.comparison.case import Case, roundness, truth_of_hits
-from reference.comparison.decisions import Answers, Questions, judge_ids, tie_or_edge, true_answers
+from reference.comparison.decisions import Answers, free_questions, judge_ids
 from reference.comparison.hits import rim_clearance
 from reference.comparison.judge import SINGLE, Bounds, Numbers, judge_numbers
 from reference.comparison.records import Guilty, Outcome, Term
@@ -32,16 +31,7 @@ def compare_hits(case: Case, first: str = FIRST, second: str = SECOND) -> Outcom
     """Hit mask, shape and primitive of every ray on both backends."""
     rays, a, b = case.bench.rays, hits_on(case, first), hits_on(case, second)
     one, other = (Answers(hits.shape, hits.primitive, hits.t) for hits in (a, b))
-    true = true_answers(case, rays)
-    asked = Questions(
-        rays,
-        one,
-        other,
-        ours_true=true,
-        mitsuba_true=true,
-        distance=lambda k: tie_or_edge(case, rays, k, one, other),
-        starts=lambda k: grazing.start_distance(case.bench.truth, rays.o[k]),
-    )
+    asked = free_questions(case, rays, one, other)
     found = judge_ids(case, "CUDA against LLVM, hits", asked)
     return _named(found, first, second)
 

@@ -134,18 +134,14 @@ def gaps(case: Case) -> Gaps:
     return found
 
 
-def compare_growth(case: Case) -> Outcome:
-    """The distance between both tracers' vertices while they reach the same primitives, in units of what a
-    bounce may do to an error: 1 + 2 t / (r cos) each. Its median, vertex by vertex."""
-    found, ours = gaps(case), free_chains(case)
-    ratios = [found.between / SINGLE, found.ours / case.epsilon, found.mitsuba / SINGLE]
-    between, own, other = (ratio / found.gain for ratio in ratios)
-    growth = tuple(
+def growth_of(gap: Array, between: Array, own: Array, other: Array) -> tuple[Growth, ...]:
+    """Vertex by vertex the statistics of chains (n, k): `gap` in S, the others in eps S times the gain."""
+    return tuple(
         Growth(
             vertex=vertex + 1,
             chains=int(there.sum()),
-            median=float(np.median(found.between[there, vertex])),
-            most=float(np.quantile(found.between[there, vertex], 0.99)),
+            median=float(np.median(gap[there, vertex])),
+            most=float(np.quantile(gap[there, vertex], 0.99)),
             scaled=float(np.median(between[there, vertex])),
             ours=float(np.nanmedian(own[there, vertex])),
             mitsuba=float(np.nanmedian(other[there, vertex])),
@@ -153,6 +149,15 @@ def compare_growth(case: Case) -> Outcome:
         for vertex, there in enumerate(np.isfinite(between).T)
         if there.sum() >= ENOUGH
     )
+
+
+def compare_growth(case: Case) -> Outcome:
+    """The distance between both tracers' vertices while they reach the same primitives, in units of what a
+    bounce may do to an error: 1 + 2 t / (r cos) each. Its median, vertex by vertex."""
+    found, ours = gaps(case), free_chains(case)
+    ratios = [found.between / SINGLE, found.ours / case.epsilon, found.mitsuba / SINGLE]
+    between, own, other = (ratio / found.gain for ratio in ratios)
+    growth = growth_of(found.between, between, own, other)
     rays = StepRays(ours.rays.o, ours.rays.d, ours.rays.pixel, ours.rays, ours.events)
     last = np.nan_to_num(between).max(axis=1, initial=0)
     kept, distance = samples(case, rays, np.arange(len(rays)), None)

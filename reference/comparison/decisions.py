@@ -163,6 +163,28 @@ def true_answers(case: Case, rays: RaySet) -> Callable[[Array], Answers]:
     return lambda k: Answers(*case.bench.truth.nearest(rays.o[k], rays.d[k]))
 
 
+def free_questions(
+    case: Case,
+    rays: RaySet,
+    ours: Answers,
+    mitsuba: Answers,
+    apart: Callable[[Callable[[Array], Answers]], Array] | None = None,
+) -> Questions:
+    """The same rays for both sides, which leave no surface; `apart`: from what extended precision says of
+    some rays to a mask of rays that count as different."""
+    true = true_answers(case, rays)
+    return Questions(
+        rays,
+        ours,
+        mitsuba,
+        ours_true=true,
+        mitsuba_true=true,
+        distance=lambda k: tie_or_edge(case, rays, k, ours, mitsuba),
+        starts=lambda k: grazing.start_distance(case.bench.truth, rays.o[k]),
+        apart=None if apart is None else apart(true),
+    )
+
+
 def tie_or_edge(case: Case, rays: RaySet, k: Array, ours: Answers, mitsuba: Answers) -> Array:
     """(n,) lengths by which some rays (by number) are off a silhouette, an edge or a tie of the two
     primitives that are named; 0 at the horizon of a plane."""

@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from reference.comparison import grazing
 from reference.comparison.case import Case, roundness, sizes, truth_of_hits
-from reference.comparison.decisions import Answers, Questions, judge_ids, tie_or_edge, true_answers
+from reference.comparison.decisions import Answers, free_questions, judge_ids
 from reference.comparison.hits import rim_clearance
 from reference.comparison.judge import SINGLE, Numbers, bounds, judge_numbers
 from reference.comparison.kinds import has_shapes
@@ -48,16 +47,7 @@ def compare_mask(case: Case) -> Outcome:
     blank = b.theirs < 0
     ours = Answers(b.shape, b.primitive, b.ours)
     theirs = Answers(np.where(blank, -1, b.hits.shape), np.where(blank, -1, b.hits.primitive), b.theirs)
-    true = true_answers(case, b.rays)
-    asked = Questions(
-        b.rays,
-        ours,
-        theirs,
-        ours_true=true,
-        mitsuba_true=true,
-        distance=lambda k: tie_or_edge(case, b.rays, k, ours, theirs),
-        starts=lambda k: grazing.start_distance(case.bench.truth, b.rays.o[k]),
-    )
+    asked = free_questions(case, b.rays, ours, theirs)
     outcome = judge_ids(case, "depth buffer, mask", asked, "grazing pixels")
     size = b.picture.shape
     panels = Panels("depth", b.picture, b.theirs.reshape(size), ours.differ(theirs).reshape(size))

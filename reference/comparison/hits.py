@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference.comparison import grazing
 from reference.comparison.case import Case, roundness, truth_of_hits
-from reference.comparison.decisions import Answers, Questions, judge_ids, tie_or_edge, true_answers
+from reference.comparison.decisions import Answers, free_questions, judge_ids
 from reference.comparison.judge import SINGLE, Numbers, bounds, judge_numbers
 from reference.comparison.kinds import by_kind, has_shapes
 from reference.comparison.records import Outcome, Term
@@ -26,17 +25,7 @@ def compare_ids(case: Case) -> Outcome:
     rays, hits, other = case.bench.rays, case.ours, case.bench.theirs
     ours = Answers(hits.shape, hits.primitive, hits.t)
     theirs = Answers(other.shape, other.primitive, other.t)
-    true = true_answers(case, rays)
-    asked = Questions(
-        rays,
-        ours,
-        theirs,
-        ours_true=true,
-        mitsuba_true=true,
-        distance=lambda k: tie_or_edge(case, rays, k, ours, theirs),
-        starts=lambda k: grazing.start_distance(case.bench.truth, rays.o[k]),
-        apart=audit(case, ours, true),
-    )
+    asked = free_questions(case, rays, ours, theirs, lambda true: audit(case, ours, true))
     return judge_ids(case, "hits", asked)
 
 

@@ -7,8 +7,9 @@ from functools import partial
 
 import tracer
 from reference.comparison.case import Case
+from reference.comparison.materials import material_of
 from reference.comparison.records import Outcome, Term
-from reference.comparison.truth import MESH, PLANE, SPHERE, material_of
+from reference.comparison.truth import MESH, PLANE, SPHERE
 from tracer.shapes import Instance, Mesh, Plane, Sphere
 
 KINDS: dict[str, tuple[type, ...]] = {PLANE: (Plane,), SPHERE: (Sphere,), MESH: (Mesh, Instance)}

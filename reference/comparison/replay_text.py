@@ -6,7 +6,8 @@ import math
 
 import tracer
 from reference.comparison.decisions import ELSEWHERE
-from reference.comparison.replay import DEEPEST, MOST, SIDES, Side, Vertex
+from reference.comparison.replay import DEEPEST, MOST, Vertex
+from reference.comparison.replay_sides import SIDES, Side
 from tracer.lights import AreaLight
 
 WIDTH = 24

@@ -15,9 +15,8 @@ import numpy as np
 
 import tracer
 from reference import extended, plain
+from reference.comparison.materials import material_of
 from reference.extended import Extended
-from tracer.material import Material
-from tracer.shapes import Instance
 
 PLANE, SPHERE, MESH = "plane", "sphere", "mesh"
 
@@ -141,7 +140,7 @@ class Truth:
         cosine = np.ones(len(shape))
         k = np.flatnonzero(~self.flat[shape])
         if len(k):
-            weights = barycentrics(extended.number(p)[k], self.triangles(shape[k], primitive[k]))
+            weights = extended.barycentrics(extended.number(p)[k], self.triangles(shape[k], primitive[k]))
             normals = extended.number(self.corner_normals[self.first[shape[k]] + primitive[k]])
             mixed = extended.unit((weights[..., None] * normals).sum(axis=1))
             mixed = np.where(entering[k, None], mixed, -mixed)
@@ -206,17 +205,6 @@ class Truth:
         return t, number, primitive
 
 
-def barycentrics(p: Any, corners: Any) -> Extended:
-    """(n, 3) weights of the corners at points of triangles (n, 3, 3)."""
-    corners = extended.number(corners)
-    a, b, c = (corners[..., k, :] for k in range(3))
-    normal = extended.cross(b - a, c - a)
-    area = extended.dot(normal, normal)
-    second = extended.dot(extended.cross(p - a, c - a), normal) / area
-    third = extended.dot(extended.cross(b - a, p - a), normal) / area
-    return np.stack([1 - second - third, second, third], axis=-1)
-
-
 def _geometry_entry(scene: tracer.Scene, entry: dict[str, Any]) -> dict[str, Any]:
     """The entry of a shape without its looks, its file where it lies."""
     looks = ("texture", "color", "material", "texture_space")
@@ -235,11 +223,3 @@ def _mesh_arrays(mesh: plain.Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     corners = np.array(mesh.vertices)[np.array(mesh.triangles)]
     normals = np.zeros_like(corners) if mesh.corner_normals is None else np.array(mesh.corner_normals)
     return corners, normals, np.array([any(n) for n in mesh.normals])
-
-
-def material_of(scene: tracer.Scene, number: int) -> Material:
-    """The material of a shape; an instance without one has that of its mesh."""
-    shape = scene.shapes[number]
-    if shape.material is None and isinstance(shape, Instance):
-        return material_of(scene, next(k for k, other in enumerate(scene.shapes) if other.name == shape.of))
-    return scene.materials[shape.material] if shape.material is not None else Material()
