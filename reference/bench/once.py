@@ -17,6 +17,7 @@ def main(peer: str, file: str, threads: str, started: str) -> None:
     from tracer.scene import load
 
     scene = load(file, allow_outside=True)
+    from reference.bench.memory import high_water
     from reference.bench.peers import MAKERS
 
     with thread_count(int(threads)):
@@ -27,17 +28,7 @@ def main(peer: str, file: str, threads: str, started: str) -> None:
         before = time.perf_counter()
         runner.frame()
         later = time.perf_counter() - before
-    print(json.dumps({"first": first, "later": later, "process": process, "peak": peak()}))
-
-
-def peak() -> float:
-    """The most memory this process held, in MiB; NaN where the system does not say."""
-    try:
-        import resource
-    except ImportError:
-        return float("nan")
-    size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return size / 1024**2 if sys.platform == "darwin" else size / 1024
+    print(json.dumps({"first": first, "later": later, "process": process, "peak": high_water()}))
 
 
 if __name__ == "__main__":

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import subprocess
 import time
 from dataclasses import dataclass
+from math import isnan
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 import tracer
+from reference.bench.memory import high_water
 from reference.povray.document import export_povray
 from tracer.errors import MachineError
 
@@ -22,6 +23,9 @@ COUNTED = {
     "reflected": r"Reflected Rays:\s+(\d+)",
     "refracted": r"(?:Refracted|Transmitted) Rays:\s+(\d+)",
 }
+
+WATCH = 0.005
+"""Seconds between two looks at the memory."""
 
 
 @dataclass(frozen=True)
@@ -54,15 +58,17 @@ class PovrayProgram:
         self._command += [f"+WT{threads}", "-A", "-D", "-V", "+FN8"]
         self.last: PovrayRun
 
-    def run(self) -> PovrayRun:
-        """Renders the picture once; raises `MachineError` where the program fails."""
+    def run(self, watched: bool = False) -> PovrayRun:
+        """Renders the picture once; memory is NaN unless `watched`, which takes a little of the time. Raises
+        `MachineError` where the program fails."""
         log = self._folder / "povray.log"
         started = time.perf_counter()
         with log.open("w") as stream:
             process = subprocess.Popen(
                 self._command, cwd=self._folder, stdin=subprocess.DEVNULL, stdout=stream, stderr=stream
             )
-            peak = _wait(process)
+            peak = _watch(process) if watched else float("nan")
+            process.wait()
         whole = time.perf_counter() - started
         said = log.read_text("utf-8", errors="replace")
         if process.returncode != 0:
@@ -81,14 +87,14 @@ class PovrayProgram:
         return self.last
 
 
-def _wait(process: subprocess.Popen[bytes]) -> float:
-    """Waits for the end; the most memory in MiB, NaN where the system does not say."""
-    if not hasattr(os, "wait4"):
-        process.wait()
-        return float("nan")
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    return usage.ru_maxrss / 1024
+def _watch(process: subprocess.Popen[bytes]) -> float:
+    """Looks again and again until the end, as POV-Ray does not say it; the most memory in MiB."""
+    most = float("nan")
+    while process.poll() is None:
+        now = high_water(process.pid)
+        most = most if isnan(now) else now  # a mark only rises; of a process that has ended there is none
+        time.sleep(WATCH)
+    return most
 
 
 def _counts(said: str) -> dict[str, int]:

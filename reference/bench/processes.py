@@ -21,7 +21,7 @@ ROOT = Path(reference.__file__).resolve().parents[1]
 def process_of(peer: str, scene: tracer.Scene, folder: Path, threads: int) -> Process:
     """Starts it, waits for it; raises `MachineError` where it fails."""
     if peer == "povray":
-        run = PovrayProgram(scene, folder, threads).run()
+        run = PovrayProgram(scene, folder, threads).run(watched=True)
         return Process(peer, run.whole, float("nan"), run.whole, run.peak)
     file = folder / "scene.toml"
     scene.save(file)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 from reference.bench import frames, peers, plan
 from reference.bench.frames import Terms, measure
 from reference.bench.icosphere import icosphere
+from reference.bench.memory import high_water
 from reference.bench.peers import Shot, hints
 from reference.bench.rays import NUDGE, primary, secondary
 from reference.bench.records import Benchmark, Build, Frame, Group, Point, Process, Rate, Series
@@ -125,6 +127,17 @@ def test_peers_that_are_not_installed_are_named(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(peers, "find_povray", lambda: None)
     assert list(hints()) == ["mitsuba", "povray"]
     assert all("install" in hint for hint in hints().values())
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="only Linux says it")
+def test_memory_is_that_of_the_program_and_not_of_its_parent() -> None:
+    ballast = np.ones(100 * 2**17)  # 100 MiB in this process
+    code = "from reference.bench.memory import high_water; print(high_water())"
+    root = Path(peers.__file__).resolve().parents[2]
+    said = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True)
+    assert high_water() > 100 and ballast.all()
+    assert 3 < float(said.stdout) < 100
+    assert np.isnan(high_water("none"))
 
 
 # ---- what is measured ----
