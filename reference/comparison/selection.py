@@ -18,10 +18,8 @@ STANDARD = (
     "optics_total_reflection",
     "shape_instance",
     "shape_smooth",
-    "light_disk",
-    "texture_image",
 )
-"""Scenes of a run that names none: every kind of shape, light and event, in about half a minute."""
+"""Scenes of a run that names none: every kind of shape and event, area lights, pictures; within a minute."""
 
 STANDARD_RANDOM, FULL_RANDOM = 2, 16
 """Random scenes of a run that asks for no number of them."""

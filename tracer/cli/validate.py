@@ -96,7 +96,7 @@ def validate(interruption: Interruption, scenes: tuple[str, ...], **options: Any
 
     \b
     Examples:
-      tracer validate                                  about half a minute
+      tracer validate                                  a standard set, within a minute
       tracer validate --full                           everything
       tracer validate my.toml --out report
       tracer validate --random 20 --seed 100
