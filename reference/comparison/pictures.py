@@ -16,7 +16,7 @@ from reference.comparison.judge import replay, samples, share_of
 from reference.comparison.kinds import has_shapes
 from reference.comparison.records import Guilty, Outcome, Panels, Replay, Term
 from reference.comparison.renders import distance, render_of
-from reference.comparison.second_version import plain_colors
+from reference.comparison.second_version import plain_pixels
 from reference.tolerances import TOLERANCES
 from tracer.compare import compare_pictures
 
@@ -111,11 +111,13 @@ def second_opinion(case: Case, pixels: Array) -> tuple[Guilty, dict[int, str]]:
     if not len(pixels):
         return "", {}
     theirs, ours = their_picture(case), render_of(case).result
-    truth = plain_colors(case.bench.small, pixels)
+    truth, depth = plain_pixels(case.bench.small, pixels)
     allowed = TOLERANCES["color, Mitsuba"].value
-    wrong = [
-        bool((np.abs(side.color.reshape(-1, 3)[pixels] - truth) > allowed).any()) for side in (ours, theirs)
-    ]
+    wrong = []
+    for side in (ours, theirs):
+        color, own = side.color.reshape(-1, 3)[pixels], side.depth.ravel()[pixels]
+        off = np.abs(color - truth).max(axis=1) > allowed
+        wrong.append(bool((off | ((own < 0) != (depth < 0))).any()))
     guilty: Guilty = "both" if all(wrong) else "ours" if wrong[0] else "mitsuba" if wrong[1] else "unknown"
     return guilty, {int(k): f"(plain) color {color}" for k, color in zip(pixels, truth, strict=True)}
 

@@ -33,12 +33,13 @@ TRIANGLES_A_PIXEL = 40
 COUNTED = ("total_internal", "ended_by_cutoff", "ended_by_depth", "deepest_level")
 
 
-def plain_colors(scene: tracer.Scene, pixels: Array) -> Array:
-    """(k, 3) colors of some pixels (numbers, row by row), one ray each."""
+def plain_pixels(scene: tracer.Scene, pixels: Array) -> tuple[Array, Array]:
+    """(k, 3) colors of some pixels (numbers, row by row), one ray each, and their depths (k,), -1 blank."""
     world, width = plain_world(scene), scene.camera.resolution[0]
     places = ((int(k) % width, int(k) // width) for k in pixels)
     pictures = [plain.render(world, supersample=1, crop=(x, y, x + 1, y + 1)) for x, y in places]
-    return np.array([picture.color[0, 0] for picture in pictures]).reshape(-1, 3)
+    colors = np.array([picture.color[0, 0] for picture in pictures]).reshape(-1, 3)
+    return colors, np.array([picture.depth[0, 0] for picture in pictures])
 
 
 @dataclass(frozen=True)
