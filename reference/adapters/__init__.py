@@ -48,17 +48,17 @@ CAMERAS: dict[type[Record], Callable[[Canvas, float, int], Perspective]] = {Came
 
 def body_of(number: int, shape: ShapeRecord, around: Surroundings) -> Body:
     """The shape with that number in Mitsuba's terms; raises `UsageError` for a kind without adapter."""
-    return _adapter(SHAPES, shape)(number, shape, around)
+    return adapter_of(SHAPES, shape)(number, shape, around)
 
 
 def points_of(light: LightRecord) -> np.ndarray:
     """(n, 3): the points that a light consists of."""
-    return _adapter(LIGHTS, light)(light)
+    return adapter_of(LIGHTS, light)(light)
 
 
 def sensor_of(camera: Camera, canvas: Canvas, extent: float, supersample: int = 1) -> Perspective:
     """The camera, with its canvas in the size wanted, in Mitsuba's terms."""
-    return _adapter(CAMERAS, camera)(canvas, extent, supersample)
+    return adapter_of(CAMERAS, camera)(canvas, extent, supersample)
 
 
 def without_adapter() -> list[str]:
@@ -67,9 +67,10 @@ def without_adapter() -> list[str]:
     return missing + [f"light {kind}" for kind, record in LIGHT_KINDS.items() if record not in LIGHTS]
 
 
-def _adapter(known: dict, record: Record) -> Callable:
+def adapter_of(known: dict, record: Record, renderer: str = "Mitsuba", room: str = "adapters") -> Callable:
+    """The adapter of a record in a registry; raises `UsageError` for a kind that the room does not know."""
     adapter = known.get(type(record))
     if adapter is None:
         kind = getattr(record, "kind", type(record).__name__)
-        raise UsageError(f'Mitsuba has no counterpart of "{kind}": reference/adapters knows no such kind')
+        raise UsageError(f'{renderer} has no counterpart of "{kind}": reference/{room} knows no such kind')
     return adapter

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import InitVar, dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -74,15 +74,14 @@ class Case:
     words: str = ""
     bench: Bench = field(init=False, repr=False)
     memory: dict[str, Any] = field(init=False, repr=False, default_factory=dict)
+    shared: InitVar[Bench | None] = None
 
-    def __post_init__(self) -> None:
-        self.bench = Bench(self.scene, self.rays, self.seed)
+    def __post_init__(self, shared: Bench | None) -> None:
+        self.bench = shared or Bench(self.scene, self.rays, self.seed)
 
     def in_precision(self, precision: str) -> Case:
         """The same case in another precision; scene, rays and Mitsuba's side are shared."""
-        other = replace(self, precision=precision)
-        other.bench = self.bench
-        return other
+        return replace(self, precision=precision, shared=self.bench)
 
     def ulps(self, error: Array, value: Array | None = None) -> Array:
         """Errors of ours in ulp of our precision of `value`, of 1 when left out."""

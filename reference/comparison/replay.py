@@ -16,6 +16,7 @@ from reference.comparison.rays import RaySet, single
 from reference.comparison.replay_sides import OURS, Side, sides_of
 from reference.tolerances import EPSILON
 from reference.whitted_tables import plain_world
+from reference.whitted_world import CUTOFF_SLACK
 from tracer.errors import UsageError
 
 Array = np.ndarray
@@ -25,9 +26,6 @@ DEEPEST = 8
 
 MOST = 32
 """Vertices that are shown, at most."""
-
-CUTOFF_SLACK = 1e-6
-"""The model's: a product of shares that meets the cut-off in decimals is traced."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from reference import adapters
-from reference.adapters import points_of
+from reference.adapters import adapter_of, points_of
 from reference.povray import shapes, textures
 from reference.povray.camera import perspective
 from reference.povray.shapes import Surroundings
@@ -18,7 +18,6 @@ from reference.povray.text import Space
 from reference.povray.textures import Ground
 from tracer.camera import Camera
 from tracer.canvas import Canvas
-from tracer.errors import UsageError
 from tracer.lights import LIGHT_KINDS
 from tracer.records import Record
 from tracer.shapes import SHAPE_KINDS, Instance, Mesh, Plane, ShapeRecord, Sphere
@@ -70,8 +69,4 @@ def without_adapter() -> list[str]:
 
 
 def _adapter(known: dict, record: Record) -> Callable:
-    adapter = known.get(type(record))
-    if adapter is None:
-        kind = getattr(record, "kind", type(record).__name__)
-        raise UsageError(f'POV-Ray has no counterpart of "{kind}": reference/povray knows no such kind')
-    return adapter
+    return adapter_of(known, record, "POV-Ray", "povray")
