@@ -6,7 +6,6 @@ import os
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import tracer
 from reference.comparison import Outcome, Progress, Term, Validation, all_terms, find_terms, run
@@ -19,12 +18,12 @@ from reference.report import (
     write_json,
     write_report,
 )
+from reference.report.destination import Destination
 from tracer.backends import find_backend, has_cuda
-from tracer.errors import OutputError
 from tracer.film.atomic import atomic_write, check_writable
 from tracer.scene import load
 
-PAGE, TWIN, PARTIAL_PAGE = "index.html", "index.json", "index.partial.html"
+PARTIAL_PAGE = "index.partial.html"
 
 
 @dataclass(frozen=True)
@@ -73,36 +72,23 @@ class Request:
 
 
 @dataclass(frozen=True)
-class Files:
-    """Where results go: the page and its twin in the folder `out`; `json`, `summary`, `headline`: files of
-    their own, if asked for."""
+class Files(Destination):
+    """Where a comparison goes; `headline`: the file whose headline is rewritten, if asked for."""
 
-    out: str
-    json: str | None = None
-    summary: str | None = None
     headline: str | None = None
 
     def check(self) -> None:
-        """Refuses what could not be written, before a long run; makes the folder. Raises `OutputError`, and
-        `UsageError` for a headline without a place."""
-        try:
-            os.makedirs(self.out, exist_ok=True)
-        except OSError as error:
-            raise OutputError(f"{self.out}: the folder cannot be made: {error.strerror}") from error
-        wanted = [(os.path.join(self.out, name), (Path(name).suffix,)) for name in (PAGE, TWIN)]
-        wanted += [(file, (".json",)) for file in (self.json,) if file]
-        wanted += [(file, (".md",)) for file in (self.summary, self.headline) if file]
-        for file, suffixes in wanted:
-            check_writable(file, suffixes)
+        """Also refuses a headline without a place. Raises `OutputError`, `UsageError`."""
+        super().check()
         if self.headline:
+            check_writable(self.headline, (".md",))
             headline_place(self.headline)
 
     def write(self, validation: Validation) -> list[str]:
         """Writes all files and returns their names."""
-        page, twin = (os.path.join(self.out, name) for name in (PAGE, TWIN))
-        write_report(page, validation)
-        write_json(twin, validation)
-        written = [page, twin]
+        write_report(self.page, validation)
+        write_json(self.twin, validation)
+        written = [self.page, self.twin]
         if self.json:
             write_json(self.json, validation)
             written.append(self.json)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -16,12 +15,11 @@ from reference.bench.plan import FULL, QUICK, TITLES, Result, Set, Step, steps_o
 from reference.bench.records import PEERS, Benchmark, Build, Group, Point, Rate, Series
 from reference.bench.report import page_of, summary_of
 from reference.bench.scenes import Workshop
+from reference.report.destination import Destination
 from reference.report.header import COMMAND, machine_facts
 from tracer.backends import thread_count
-from tracer.errors import MachineError, OutputError
-from tracer.film.atomic import atomic_write, check_writable
-
-PAGE, TWIN = "index.html", "index.json"
+from tracer.errors import MachineError
+from tracer.film.atomic import atomic_write
 
 Progress = Callable[[float, float, Step], None]
 """(weight of what is done, of all, the step that ended)."""
@@ -62,31 +60,13 @@ class Request:
         return self.only or (("scenes",) if self.scenes else ())
 
 
-@dataclass(frozen=True)
-class Files:
-    """Where results go: the page and its twin in the folder `out`; `json`, `summary`: files of their own."""
-
-    out: str
-    json: str | None = None
-    summary: str | None = None
-
-    def check(self) -> None:
-        """Refuses what could not be written, before a long run; makes the folder. Raises `OutputError`."""
-        try:
-            os.makedirs(self.out, exist_ok=True)
-        except OSError as error:
-            raise OutputError(f"{self.out}: the folder cannot be made: {error.strerror}") from error
-        wanted = [(os.path.join(self.out, name), (Path(name).suffix,)) for name in (PAGE, TWIN)]
-        wanted += [
-            (file, (suffix,)) for file, suffix in ((self.json, ".json"), (self.summary, ".md")) if file
-        ]
-        for file, suffixes in wanted:
-            check_writable(file, suffixes)
+class Files(Destination):
+    """Where a benchmark goes."""
 
     def write(self, benchmark: Benchmark) -> list[str]:
         """Writes all files and returns their names."""
         numbers = json.dumps(to_dict(benchmark), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-        texts = {os.path.join(self.out, PAGE): page_of(benchmark), os.path.join(self.out, TWIN): numbers}
+        texts = {self.page: page_of(benchmark), self.twin: numbers}
         texts |= {self.json: numbers} if self.json else {}
         texts |= {self.summary: summary_of(benchmark)} if self.summary else {}
         for file, text in texts.items():
