@@ -10,6 +10,7 @@ import click
 
 from tracer.cli.failures import talk
 from tracer.cli.interruption import Interruption
+from tracer.cli.options import report_options
 from tracer.cli.progress import KINDS, make_reporter
 
 if TYPE_CHECKING:
@@ -36,18 +37,7 @@ if TYPE_CHECKING:
     metavar="N",
     help="Pixels across the pictures, at most.  [default: 512, with --full 1024]",
 )
-@click.option(
-    "--out",
-    type=click.Path(),
-    default="reports/benchmark",
-    show_default=True,
-    metavar="DIR",
-    help="Folder of the page: index.html and index.json.",
-)
-@click.option(
-    "--json", "json_file", type=click.Path(), metavar="FILE", help="Write the numbers here as well."
-)
-@click.option("--summary", type=click.Path(), metavar="FILE", help="Write a summary in Markdown.")
+@report_options("reports/benchmark", "page")
 @click.option("--quiet", is_flag=True, help="Print no table.")
 @click.option("--progress", type=click.Choice(KINDS), default="auto", show_default=True, help="On stderr.")
 @click.pass_obj

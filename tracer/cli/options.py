@@ -30,6 +30,28 @@ def scene_options(command: Command) -> Command:
     )(command)
 
 
+def report_options(folder: str, what: str) -> Callable[[Command], Command]:
+    """`--out`, `--json` and `--summary` of a command that writes a page; `what`: how it calls that page."""
+
+    def add(command: Command) -> Command:
+        command = click.option(
+            "--summary", type=click.Path(), metavar="FILE", help="Write a summary in Markdown."
+        )(command)
+        command = click.option(
+            "--json", "json_file", type=click.Path(), metavar="FILE", help="Write the numbers here as well."
+        )(command)
+        return click.option(
+            "--out",
+            type=click.Path(),
+            default=folder,
+            show_default=True,
+            metavar="DIR",
+            help=f"Folder of the {what}: index.html and index.json.",
+        )(command)
+
+    return add
+
+
 def picture_options(command: Command) -> Command:
     """Where pictures go, how large and exact they are, and what is told about them; see `Wishes`."""
     for option in reversed(_PICTURE_OPTIONS):

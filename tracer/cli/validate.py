@@ -10,7 +10,7 @@ import click
 
 from tracer.cli.failures import talk
 from tracer.cli.interruption import Interruption
-from tracer.cli.options import scene_options
+from tracer.cli.options import report_options, scene_options
 from tracer.cli.progress import KINDS, make_reporter
 
 if TYPE_CHECKING:
@@ -58,18 +58,7 @@ PRECISIONS = {"single": ("single",), "double": ("double",), "both": ("single", "
 @click.option(
     "--threads", type=click.IntRange(1, 1024), metavar="N", help="CPU threads.  [default: all cores]"
 )
-@click.option(
-    "--out",
-    type=click.Path(),
-    default="reports/crossvalidation",
-    show_default=True,
-    metavar="DIR",
-    help="Folder of the report: index.html and index.json.",
-)
-@click.option(
-    "--json", "json_file", type=click.Path(), metavar="FILE", help="Write the numbers here as well."
-)
-@click.option("--summary", type=click.Path(), metavar="FILE", help="Write a summary in Markdown.")
+@report_options("reports/crossvalidation", "report")
 @click.option(
     "--headline",
     type=click.Path(),
