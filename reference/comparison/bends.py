@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from reference import extended
-from reference.comparison.case import Case, sizes
+from reference.comparison.case import Case, once_a_case, sizes
 from reference.comparison.rays import single
 from reference.comparison.steps import Steps, agreed_steps
 from reference.comparison.truth import MESH, SPHERE, Truth
@@ -44,16 +44,9 @@ class Bends:
         return d, n, np.where(self.entering[:, None], n, -n)
 
 
+@once_a_case
 def bends(case: Case, refracts: bool) -> Bends:
-    """The steps with that event; glass of index 1 is left out. Made once a case."""
-    key = f"bends {refracts}"
-    if key not in case.memory:
-        case.memory[key] = _bends(case, refracts)
-    found: Bends = case.memory[key]
-    return found
-
-
-def _bends(case: Case, refracts: bool) -> Bends:
+    """The steps with that event; glass of index 1 is left out."""
     truth, (s, sure) = case.bench.truth, agreed_steps(case)
     wanted = (s.refracts == refracts) & (~s.refracts | (truth.ior[s.shape] != 1))
     s, sure = s.part(wanted), sure[wanted]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import InitVar, dataclass, field, replace
-from functools import cached_property
-from typing import Any
+from functools import cached_property, wraps
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from reference.tolerances import EPSILON, TOLERANCES
 from tracer.shapes import Sphere
 
 Array = np.ndarray
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 PIXELS = 40_000
 """Pixels of a picture that is compared, at most."""
@@ -33,7 +37,7 @@ class Bench:
         self.scene = comparable(scene)
         self.small = small_picture(self.scene, min(rays, PIXELS))
         self.count, self.seed = rays, seed
-        self.memory: dict[str, Any] = {}
+        self.memory: dict[Any, Any] = {}
 
     @cached_property
     def truth(self) -> Truth:
@@ -73,7 +77,7 @@ class Case:
     seed: int = 0
     words: str = ""
     bench: Bench = field(init=False, repr=False)
-    memory: dict[str, Any] = field(init=False, repr=False, default_factory=dict)
+    memory: dict[Any, Any] = field(init=False, repr=False, default_factory=dict)
     shared: InitVar[Bench | None] = None
 
     def __post_init__(self, shared: Bench | None) -> None:
@@ -110,6 +114,30 @@ class Case:
     def extents(self) -> Array:
         """(n,) S of each ray: the largest |coordinate| among the finite shapes, its origin and its hit."""
         return sizes(self.bench.truth, self.bench.rays.o, self.ours.position)
+
+
+def once_a_case(make: Callable[Concatenate[Case, P], R]) -> Callable[Concatenate[Case, P], R]:
+    """A function of a case (and plain arguments) whose result is kept with the case."""
+    return _kept(make, lambda case: case.memory)
+
+
+def once_a_scene(make: Callable[Concatenate[Case, P], R]) -> Callable[Concatenate[Case, P], R]:
+    """The same where the result does not depend on our precision: kept for both."""
+    return _kept(make, lambda case: case.bench.memory)
+
+
+def _kept(
+    make: Callable[Concatenate[Case, P], R], memory_of: Callable[[Case], dict[Any, Any]]
+) -> Callable[Concatenate[Case, P], R]:
+    @wraps(make)
+    def kept(case: Case, *arguments: P.args, **named: P.kwargs) -> R:
+        key, memory = (make, arguments, tuple(named.items())), memory_of(case)
+        if key not in memory:
+            memory[key] = make(case, *arguments, **named)
+        result: R = memory[key]
+        return result
+
+    return kept
 
 
 def in_ulp(error: Array, value: Array | None, precision: str) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from reference import extended
 from reference.comparison import optics
 from reference.comparison.bends import bend_radius
-from reference.comparison.case import Case, sizes
+from reference.comparison.case import Case, once_a_case, sizes
 from reference.comparison.judge import SINGLE, guilty_side, replay, samples
 from reference.comparison.kinds import has_shapes
 from reference.comparison.rays import StepRays
@@ -39,6 +39,7 @@ class Gaps:
     gain: Array
 
 
+@once_a_case
 def free_chains(case: Case) -> Chains:
     """A part of our chains."""
     every = chains(case)

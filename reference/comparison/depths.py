@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from reference.comparison.case import Case, roundness, sizes, truth_of_hits
+from reference.comparison.case import Case, once_a_case, roundness, sizes, truth_of_hits
 from reference.comparison.decisions import Answers, free_questions, judge_ids
 from reference.comparison.hits import rim_clearance
 from reference.comparison.judge import SINGLE, Numbers, bounds, judge_numbers
@@ -32,12 +32,10 @@ class DepthBuffers:
         self.hits = theirs.intersect(*theirs.camera_rays())
 
 
+@once_a_case
 def depth_buffers(case: Case) -> DepthBuffers:
-    """The buffers, rendered once a case."""
-    if "depth" not in case.memory:
-        case.memory["depth"] = DepthBuffers(case)
-    buffers: DepthBuffers = case.memory["depth"]
-    return buffers
+    """The buffers of a case."""
+    return DepthBuffers(case)
 
 
 def compare_mask(case: Case) -> Outcome:

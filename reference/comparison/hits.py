@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference.comparison.case import Case, roundness, truth_of_hits
+from reference.comparison.case import Case, once_a_case, roundness, truth_of_hits
 from reference.comparison.decisions import Answers, free_questions, judge_ids
 from reference.comparison.judge import SINGLE, Numbers, bounds, judge_numbers
 from reference.comparison.kinds import by_kind, has_shapes
@@ -56,16 +56,9 @@ class Agreed:
     left_out: int
 
 
+@once_a_case
 def agreed(case: Case, kind: str) -> Agreed:
-    """Where numbers can be compared; the rim of a sphere is left to the term of hits. Made once a case."""
-    key = f"agreed {kind}"
-    if key not in case.memory:
-        case.memory[key] = _agreed(case, kind)
-    found: Agreed = case.memory[key]
-    return found
-
-
-def _agreed(case: Case, kind: str) -> Agreed:
+    """Where numbers can be compared; the rim of a sphere is left to the term of hits."""
     truth, rays, ours = case.bench.truth, case.bench.rays, case.ours
     k = np.flatnonzero(case.same & ours.valid)
     k = k[truth.kind[ours.shape[k]] == kind]

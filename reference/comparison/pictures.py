@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from reference import extended, whitted
-from reference.comparison.case import Case
+from reference.comparison.case import Case, once_a_scene
 from reference.comparison.decisions import LISTED
 from reference.comparison.doubt import doubt
 from reference.comparison.judge import replay, samples, share_of
@@ -75,9 +75,7 @@ def in_doubt(case: Case, apart: Array) -> Array:
     large = apart > TOLERANCES["color, Mitsuba"].value / 10
     if not large.any():
         return large
-    if "doubt" not in case.bench.memory:
-        case.bench.memory["doubt"] = doubt(case.bench.small, case.bench.mitsuba.extent, 1)
-    moves = case.bench.memory["doubt"] >= apart / 2
+    moves = doubt_of(case) >= apart / 2
     k = np.flatnonzero(large)
     edge_on = np.zeros(large.size, bool)
     edge_on[k] = cosine_of_arrival(case, k) < TOLERANCES["edge on"].value
@@ -97,13 +95,16 @@ def cosine_of_arrival(case: Case, pixels: Array) -> Array:
     return cosine
 
 
+@once_a_scene
 def their_picture(case: Case) -> whitted.Picture:
-    """The picture on Mitsuba's hits; made once a scene."""
-    memory = case.bench.memory
-    if "whitted" not in memory:
-        memory["whitted"] = whitted.render(case.bench.small, supersample=1)
-    picture: whitted.Picture = memory["whitted"]
-    return picture
+    """The picture on Mitsuba's hits."""
+    return whitted.render(case.bench.small, supersample=1)
+
+
+@once_a_scene
+def doubt_of(case: Case) -> Array:
+    """(h, w) by how much the colors of that picture move where rounding decides."""
+    return doubt(case.bench.small, case.bench.mitsuba.extent, 1)
 
 
 def second_opinion(case: Case, pixels: Array) -> tuple[Guilty, dict[int, str]]:

@@ -8,7 +8,7 @@ import numpy as np
 
 import tracer
 from reference import extended, mitsuba_scene
-from reference.comparison.case import Case
+from reference.comparison.case import Case, once_a_case, once_a_scene
 from reference.comparison.rays import PictureRays, RaySet
 
 Array = np.ndarray
@@ -24,15 +24,9 @@ class Render:
     rays: RaySet
 
 
+@once_a_case
 def render_of(case: Case) -> Render:
-    """The picture, one ray a pixel; rendered once a case."""
-    if "render" not in case.memory:
-        case.memory["render"] = _render(case)
-    found: Render = case.memory["render"]
-    return found
-
-
-def _render(case: Case) -> Render:
+    """The picture, one ray a pixel."""
     scene = case.bench.small
     result = tracer.render(
         scene, case.precision, case.backend, supersample=1, aovs=("depth", "shape", "primitive")
@@ -40,12 +34,10 @@ def _render(case: Case) -> Render:
     return Render(scene, result, pixel_centers(case, scene))
 
 
+@once_a_scene
 def small_mitsuba(case: Case) -> mitsuba_scene.MitsubaScene:
-    """The scene of small pictures in Mitsuba; built once a scene."""
-    if "mitsuba" not in case.bench.memory:
-        case.bench.memory["mitsuba"] = mitsuba_scene.build(case.bench.small)
-    built: mitsuba_scene.MitsubaScene = case.bench.memory["mitsuba"]
-    return built
+    """The scene of small pictures in Mitsuba."""
+    return mitsuba_scene.build(case.bench.small)
 
 
 def grid(scene: tracer.Scene) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 
 import tracer
 from reference import plain
-from reference.comparison.case import Case, small_picture
+from reference.comparison.case import Case, once_a_case, once_a_scene, small_picture
 from reference.comparison.decisions import LISTED
 from reference.comparison.doubt import doubt
 from reference.comparison.judge import replay, share_of
@@ -51,19 +51,19 @@ class Versions:
     theirs: plain.Picture
 
 
+@once_a_scene
+def plain_version(case: Case) -> tuple[tracer.Scene, plain.Picture]:
+    """The scene with as few pixels as the plain version can do in about a second, and its picture."""
+    share = TRIANGLES_A_PIXEL / (TRIANGLES_A_PIXEL + len(case.bench.truth.corners))
+    scene = small_picture(case.bench.scene, max(LEAST_PIXELS, round(MOST_PIXELS * share)))
+    return scene, plain.render(plain_world(scene), supersample=1)
+
+
+@once_a_case
 def versions(case: Case) -> Versions:
-    """Both pictures; the plain one is made once a scene, ours once a case."""
-    shared, memory = case.bench.memory, case.memory
-    if "plain" not in shared:
-        share = TRIANGLES_A_PIXEL / (TRIANGLES_A_PIXEL + len(case.bench.truth.corners))
-        scene = small_picture(case.bench.scene, max(LEAST_PIXELS, round(MOST_PIXELS * share)))
-        shared["plain"] = scene, plain.render(plain_world(scene), supersample=1)
-    if "plain" not in memory:
-        scene, picture = shared["plain"]
-        ours = tracer.render(scene, case.precision, case.backend, supersample=1)
-        memory["plain"] = Versions(scene, ours, picture)
-    found: Versions = memory["plain"]
-    return found
+    """Both pictures."""
+    scene, picture = plain_version(case)
+    return Versions(scene, tracer.render(scene, case.precision, case.backend, supersample=1), picture)
 
 
 def compare_colors(case: Case) -> Outcome:

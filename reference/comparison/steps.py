@@ -13,7 +13,7 @@ import numpy as np
 
 import tracer
 from reference.comparison import grazing
-from reference.comparison.case import Case, sizes
+from reference.comparison.case import Case, once_a_case, sizes
 from reference.comparison.hits import rim_clearance
 from reference.comparison.rays import RaySet, StepRays, single
 from reference.comparison.truth import MESH, SPHERE, Truth
@@ -93,30 +93,23 @@ class Steps:
         return StepRays(self.origin, self.way, self.pixel, first, self.events)
 
 
+@once_a_case
 def chains(case: Case) -> Chains:
-    """Our chains through a part of the rays; made once a case."""
-    if "chains" not in case.memory:
-        rays = case.bench.rays.part(np.arange(0, len(case.bench.rays), CHAIN_SHARE))
-        kind = np.arange(len(rays)) % len(CHAINS)
-        events = np.array(CHAINS)[kind]
-        refracts = np.array([[event == "T" for event in row] for row in CHAINS])[kind]
-        path = tracer.trace_path(
-            case.bench.scene, rays.o, rays.d, events.tolist(), precision=case.precision, backend=case.backend
-        )
-        case.memory["chains"] = Chains(rays, events, refracts, path)
-    found: Chains = case.memory["chains"]
-    return found
+    """Our chains through a part of the rays."""
+    rays = case.bench.rays.part(np.arange(0, len(case.bench.rays), CHAIN_SHARE))
+    kind = np.arange(len(rays)) % len(CHAINS)
+    events = np.array(CHAINS)[kind]
+    refracts = np.array([[event == "T" for event in row] for row in CHAINS])[kind]
+    path = tracer.trace_path(
+        case.bench.scene, rays.o, rays.d, events.tolist(), precision=case.precision, backend=case.backend
+    )
+    return Chains(rays, events, refracts, path)
 
 
+@once_a_case
 def steps(case: Case) -> Steps:
-    """Our chains step by step, and Mitsuba's answers; made once a case."""
-    if "steps" not in case.memory:
-        case.memory["steps"] = _in_lockstep(case, chains(case))
-    found: Steps = case.memory["steps"]
-    return found
-
-
-def _in_lockstep(case: Case, ours: Chains) -> Steps:
+    """Our chains step by step, and Mitsuba's answers."""
+    ours = chains(case)
     rays, path, refracts = ours.rays, ours.path, ours.refracts
     o, d, (left, left_primitive) = rays.o, rays.d, np.full((2, len(rays)), -1)
     going = np.full(len(rays), True)
@@ -158,17 +151,15 @@ def parted(case: Case, s: Steps) -> Array:
     return np.asarray(again & (is_near(case, s, s.p, s.o) != is_near(case, s, s.theirs_p, s.origin)))
 
 
+@once_a_case
 def agreed_steps(case: Case) -> tuple[Steps, Array]:
     """The steps that reach the same primitive at the same place, and a mask of those away from the edges of
-    triangles and the rims of spheres, where normal and side are in doubt. Made once a case."""
-    if "agreed" not in case.memory:
-        truth, s = case.bench.truth, steps(case)
-        same = (s.shape == s.theirs_shape) & (s.primitive == s.theirs_primitive)
-        s = s.part((s.shape >= 0) & same & ~parted(case, s))
-        band = TOLERANCES["grazing band"].value * EPSILON["single"] * sizes(truth, s.o, s.p)
-        case.memory["agreed"] = s, clearance(truth, s) > band
-    found: tuple[Steps, Array] = case.memory["agreed"]
-    return found
+    triangles and the rims of spheres, where normal and side are in doubt."""
+    truth, s = case.bench.truth, steps(case)
+    same = (s.shape == s.theirs_shape) & (s.primitive == s.theirs_primitive)
+    s = s.part((s.shape >= 0) & same & ~parted(case, s))
+    band = TOLERANCES["grazing band"].value * EPSILON["single"] * sizes(truth, s.o, s.p)
+    return s, clearance(truth, s) > band
 
 
 def clearance(truth: Truth, s: Steps) -> Array:
