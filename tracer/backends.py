@@ -32,7 +32,7 @@ INVALID = 0xFFFFFFFF
 class Backend:
     """The Dr.Jit types of one combination of backend, precision and differentiability.
 
-    `FloatN` and `SingleN` are vectors of any length, the latter in single precision in either case;
+    `FloatN`, `SingleN` and `IdN` are vectors of any length, `SingleN` in single precision in either case;
     `epsilon` is the unit roundoff: 2^-24 in single, 2^-53 in double precision.
     """
 
@@ -44,6 +44,7 @@ class Backend:
     Vector4: Any
     FloatN: Any
     SingleN: Any
+    IdN: Any
     IdVector4: Any
     UInt32: Any
     Int32: Any
@@ -130,6 +131,7 @@ def _types(name: BackendName, precision: Precision, gradients: bool) -> Backend:
         Vector4=getattr(module, f"Array4f{suffix}"),
         FloatN=getattr(module, f"ArrayXf{suffix}"),
         SingleN=module.ArrayXf,
+        IdN=module.ArrayXu,
         IdVector4=module.Array4u,
         UInt32=module.UInt32,
         Int32=module.Int32,

@@ -9,8 +9,7 @@ import numpy as np
 
 from tracer.acceleration.build import build_hierarchy
 from tracer.acceleration.layout import threaded
-from tracer.acceleration.triangle import CONTACT_SLACK, TRIANGLE_WORDS
-from tracer.acceleration.walk import TriangleTables
+from tracer.acceleration.triangle import CONTACT_SLACK, TRIANGLE_WORDS, TriangleTables
 from tracer.backends import INVALID, Backend
 from tracer.errors import SceneError
 from tracer.scene import Scene
@@ -109,12 +108,7 @@ def _triangle_tables(
         order
     ]
     rows[:, 12], rows[:, 13] = primitives >> 16, primitives & 0xFFFF
-    tables = TriangleTables(
-        triangles=backend.table(rows),
-        nodes=threaded(backend, hierarchy),
-        count=backend.opaque_id(len(hierarchy.left)),
-        extent=backend.opaque(max(-hierarchy.lower[0].min(), hierarchy.upper[0].max())),
-    )
+    tables = TriangleTables(backend.table(rows), threaded(backend, hierarchy))
     slots = np.full(sum(len(mesh.corners) for mesh in meshes.values()), -1)
     slots[order] = np.arange(len(order))
     return tables, slots

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tracer.acceleration.walk import TriangleTables
+from tracer.acceleration.triangle import TriangleTables
 from tracer.backends import INVALID, Backend
 from tracer.color import decode_srgb
 from tracer.device_meshes import SmoothTables, compile_meshes, inherited, placed_meshes, source_of

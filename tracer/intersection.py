@@ -136,7 +136,7 @@ def _geometry_at(
             p_k, n_k = surface(row, p)
             point, normal = dr.select(kind == analytic, p_k, point), dr.select(kind == analytic, n_k, normal)
     if scene.triangles is not None:
-        tables = scene.triangles.triangles
+        tables = scene.triangles.rows
 
         def on_triangle(point: Any, normal: Any) -> tuple[Any, Any]:
             triangle = gather_triangle(backend, tables, _slot(scene, primitive, True))
@@ -171,7 +171,7 @@ def _smooth_normal(
     ray."""
     assert scene.smooth is not None and scene.triangles is not None
     backend = scene.backend
-    triangles, vertex_normals = scene.triangles.triangles, scene.smooth.normals
+    triangles, vertex_normals = scene.triangles.rows, scene.smooth.normals
 
     def interpolated(lit_side: Any) -> tuple[Any]:
         slot = _slot(scene, primitive, True)
@@ -210,7 +210,7 @@ def departure(scene: DeviceScene, ray: Ray) -> Departure:
     assert scene.triangles is not None
     is_mesh = active & (kind == MESH)
     slot = _slot(scene, ray.departure >> 1, is_mesh)
-    end = dr.gather(backend.Vector4, scene.triangles.triangles, slot * 4 + 2, is_mesh)
+    end = dr.gather(backend.Vector4, scene.triangles.rows, slot * 4 + 2, is_mesh)
     center = backend.Vector3(row.x, row.y, row.z)
     outward = dr.select(kind == SPHERE, normalize(ray.o - center), center)
     outward = dr.select(is_mesh, backend.Vector3(end.y, end.z, end.w), outward)
@@ -236,7 +236,7 @@ def _ground(scene: DeviceScene, ray: Ray, active: Any) -> Ground:
     kind, row = _left(scene, ray, active)
     assert scene.triangles is not None
     is_mesh = active & (kind == MESH)
-    triangle = gather_triangle(backend, scene.triangles.triangles, _slot(scene, ray.departure >> 1, is_mesh))
+    triangle = gather_triangle(backend, scene.triangles.rows, _slot(scene, ray.departure >> 1, is_mesh))
     center = backend.Vector3(row.x, row.y, row.z)
     return Ground(
         corners=tuple(dr.select(is_mesh, v, center) for v in (triangle.v0, triangle.v1, triangle.v2)),

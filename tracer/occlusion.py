@@ -10,7 +10,6 @@ import drjit as dr
 
 from tracer.acceleration.beam import CLEAR, COVERED, look_along
 from tracer.acceleration.traverse import visit_triangles
-from tracer.acceleration.triangle import TriangleTest
 from tracer.device_scene import DeviceScene
 from tracer.intersection import Surface, departure_to_light, shape_of
 from tracer.ray import Segment
@@ -101,18 +100,17 @@ def hidden_by_many(
     if scene.sphere_table is not None:
         blocked = scene.sphere_table.blocks(segment, active & suspects.many)
     if scene.triangles is not None:
-        never = scene.backend.Float(-1)
         blocked = visit_triangles(
             scene.backend,
             scene.triangles,
             segment.ray,
             lambda: departure_to_light(scene, segment.ray, surface),
             state=blocked,
-            limit=lambda blocked: dr.select(blocked, never, segment.length),
-            visit=lambda blocked, _t, _primitive, test, valid: (
-                blocked | (valid & ~_holds_light(segment, test))
-            ),
+            limit=lambda blocked: segment.length,
+            visit=lambda blocked, _t, _primitive, _test, valid: blocked | valid,
             active=active & suspects.meshes & ~blocked,
+            light=segment.length,
+            done=lambda blocked: blocked,
         )
     return blocked & active
 
@@ -158,27 +156,21 @@ def transmittance(
             lambda share: share > 0,
         )
     if scene.triangles is not None:
-        never = backend.Float(-1)
         share = visit_triangles(
             backend,
             scene.triangles,
             segment.ray,
             lambda: departure_to_light(scene, segment.ray, surface),
             state=share,
-            limit=lambda share: dr.select(share > 0, segment.length, never),
+            limit=lambda share: segment.length,
             visit=lambda share, _t, primitive, test, valid: dr.select(
-                valid & ~_holds_light(segment, test),
-                share * _crossed(_refraction_of(scene, primitive), test.owned),
-                share,
+                valid, share * _crossed(_refraction_of(scene, primitive), test.owned), share
             ),
-            active=active & suspects.meshes,
+            active=active & suspects.meshes & (share > 0),
+            light=segment.length,
+            done=lambda share: share == 0,
         )
     return share
-
-
-def _holds_light(segment: Segment, test: TriangleTest) -> Any:
-    """Mask: the light lies on the triangle's plane within rounding, so the triangle does not hide it."""
-    return dr.abs(test.height + segment.length * test.speed) <= test.slack
 
 
 def _refraction_of(scene: DeviceScene, primitive: Any) -> Any:

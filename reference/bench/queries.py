@@ -113,9 +113,10 @@ def any_triangle(device: Any, ray: Any, length: Any, active: Any) -> Any:
         ray,
         lambda: departure(device, ray),
         state=dr.full(backend.Bool, False, dr.width(ray.d)),
-        limit=lambda blocked: dr.select(blocked, backend.Float(-1), length),
+        limit=lambda blocked: length,
         visit=lambda blocked, _t, _primitive, _test, valid: blocked | valid,
         active=active,
+        done=lambda blocked: blocked,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -13,9 +14,10 @@ import tracer
 from tests.accuracy.probe import directions, rotation, unit
 from tests.accuracy.worlds import icosphere
 from tracer import device_meshes
-from tracer.acceleration import traverse
+from tracer.acceleration import grid, layout, traverse
 from tracer.acceleration.build import Hierarchy, build_hierarchy
-from tracer.acceleration.layout import NODE_WORDS, OCTANTS, threaded
+from tracer.acceleration.grid import find_grid
+from tracer.acceleration.layout import FLOAT_WORDS, GRID_WORDS, LEAF, OCTANTS, NodeLists, threaded
 from tracer.acceleration.subtrees import LARGEST_LEAF, LARGEST_SUBTREE, NODE_COST
 from tracer.backends import Backend, find_backend, thread_count
 
@@ -87,9 +89,52 @@ def built(name: str) -> tuple[Array, Hierarchy]:
     return corners, build_hierarchy(find_backend(), corners)
 
 
-def lists(tree: Hierarchy) -> Array:
-    """The layout (8 n, NODE_WORDS) on this side."""
-    return threaded(find_backend(), tree).numpy().reshape(-1, NODE_WORDS)
+@pytest.fixture(params=["grid", "floats"])
+def form(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Both ways to keep the planes of boxes, whatever suits a mesh."""
+    monkeypatch.setattr(grid, "ROOM", 0)
+    if request.param == "floats":
+        monkeypatch.setattr(layout, "find_grid", lambda tree: None)
+    return request.param
+
+
+@dataclass
+class Lists:
+    """The layout on this side: planes (8 n, 3) in the units of the lists, and links (8 n,)."""
+
+    first: Array
+    last: Array
+    link: Array
+
+    @staticmethod
+    def of(found: NodeLists) -> Lists:
+        words = found.words.numpy()
+        if found.grid is None:
+            rows = words.reshape(-1, FLOAT_WORDS)[:-1]
+            floats = rows.view(np.float32)
+            return Lists(floats[:, 0:3].copy(), floats[:, 4:7].copy(), rows[:, 3].copy())
+        rows = words.reshape(-1, GRID_WORDS)[:-1]
+        return Lists(rows[:, :3] & 0xFFFF, rows[:, :3] >> 16, rows[:, 3].copy())
+
+    def on_device(self, found: NodeLists) -> NodeLists:
+        """The same lists with these words."""
+        if found.grid is None:
+            rows = np.zeros((len(self.link) + 1, FLOAT_WORDS), np.uint32)
+            floats = rows.view(np.float32)
+            floats[:-1, 0:3], floats[:-1, 4:7], rows[:-1, 3] = self.first, self.last, self.link
+        else:
+            rows = np.zeros((len(self.link) + 1, GRID_WORDS), np.uint32)
+            rows[:-1, :3], rows[:-1, 3] = self.first | self.last << 16, self.link
+        return replace(found, words=find_backend().id_table(rows))
+
+    def slots(self, places: list[int]) -> list[int]:
+        """What lies in the leaves among these."""
+        leaves = [int(word) - LEAF for word in self.link[places] if word >= LEAF]
+        return [slot for word in leaves for slot in range(word >> 3, (word >> 3) + (word & 7))]
+
+
+def lists(tree: Hierarchy) -> Lists:
+    return Lists.of(threaded(find_backend(), tree))
 
 
 @pytest.mark.parametrize("name", MESHES)
@@ -201,77 +246,96 @@ def test_the_tree_is_as_good_as_one_cut_node_by_node(name: str) -> None:
     assert expected_cost(tree) == pytest.approx(plain_cost(boxes) / root, rel=0.02)
 
 
-def walked(nodes: Array, octant: int, crosses: Callable[[Array], bool]) -> list[int]:
+def walked(nodes: Lists, octant: int, crosses: Callable[[int], bool]) -> list[int]:
     """The nodes that a kernel visits, by place in the table."""
-    count = len(nodes) // OCTANTS
-    bits = nodes.view(np.uint32)
+    count = len(nodes.link) // OCTANTS
     node, end, visited = octant * count, (octant + 1) * count, []
     while node < end:
         visited.append(node)
-        goes_in = crosses(nodes[node]) and bits[node, 7] == 0
-        node = node + 1 if goes_in else int(bits[node, 3])
+        goes_on = crosses(node) or nodes.link[node] >= LEAF
+        node = node + 1 if goes_on else int(nodes.link[node])
     assert node == end
     return visited
 
 
 @pytest.mark.parametrize("name", MESHES)
-def test_a_walk_through_all_boxes_meets_each_leaf_once(name: str) -> None:
+def test_a_walk_through_all_boxes_meets_each_leaf_once(name: str, form: str) -> None:
     corners, tree = built(name)
     nodes = lists(tree)
-    assert nodes.shape == (OCTANTS * len(tree.left), NODE_WORDS) and nodes.dtype == np.float32
+    assert len(nodes.link) == OCTANTS * len(tree.left)
     for octant in range(OCTANTS):
         visited = walked(nodes, octant, lambda _: True)
         assert visited == list(range(octant * len(tree.left), (octant + 1) * len(tree.left)))
-        leaves = [int(word) for word in nodes.view(np.uint32)[visited, 7] if word]
-        slots = [slot for word in leaves for slot in range(word >> 3, (word >> 3) + (word & 7))]
-        assert sorted(slots) == list(range(len(corners)))
+        assert sorted(nodes.slots(visited)) == list(range(len(corners)))
 
 
 @pytest.mark.parametrize("name", MESHES)
-def test_a_walk_that_misses_the_root_ends_there(name: str) -> None:
+def test_a_walk_that_misses_the_root_ends_there(name: str, form: str) -> None:
     _, tree = built(name)
     nodes = lists(tree)
     for octant in range(OCTANTS):
-        assert walked(nodes, octant, lambda _: False) == [octant * len(tree.left)]
+        visited = walked(nodes, octant, lambda _: False)
+        assert visited == [octant * len(tree.left) + k for k in range(1 if tree.left[0] else len(visited))]
 
 
 @pytest.mark.parametrize("name", ["leaf and one", "flat in y", "doubling", "pairs"])
-def test_a_missed_box_is_left_out_with_all_below_it_and_nothing_else(name: str) -> None:
+def test_a_missed_box_is_left_out_with_all_below_it_and_nothing_else(name: str, form: str) -> None:
     """Any one box missed: the triangles below it are left out, in every octant."""
     corners, tree = built(name)
     nodes = lists(tree)
+    found = layout.find_grid(tree)
+    lower, upper = (tree.lower, tree.upper) if found is None else (found.lower, found.upper)
     rng = np.random.default_rng(1)
     for node in rng.integers(len(tree.left), size=4):
-        box = np.array([tree.lower[node], tree.upper[node]], np.float32)
-        same = ((tree.lower == tree.lower[node]) & (tree.upper == tree.upper[node])).all(axis=1)
         left_out = np.zeros(len(corners), bool)
-        for other in np.flatnonzero(same):
+        for other in np.flatnonzero(((lower == lower[node]) & (upper == upper[node])).all(axis=1)):
             left_out[tree.first[other] : tree.first[other] + tree.count[other]] = True
         for octant in range(OCTANTS):
-            planes = np.sort(box, axis=0)[[0, 1]]
             negative = np.array([octant >> k & 1 for k in range(3)], bool)
-            first, last = np.where(negative, planes[::-1], planes)
-            missed = np.concatenate([first, last])
-
-            def crosses(words: Array, missed: Array = missed) -> bool:
-                return not np.array_equal(words[[0, 1, 2, 4, 5, 6]], missed)
-
-            visited = [k for k in walked(nodes, octant, crosses) if crosses(nodes[k])]
-            words = nodes.view(np.uint32)[visited, 7]
-            slots = [slot for word in words for slot in range(word >> 3, (word >> 3) + (word & 7))]
+            first = np.where(negative, upper[node], lower[node])
+            last = np.where(negative, lower[node], upper[node])
+            missed = (nodes.first == first).all(axis=1) & (nodes.last == last).all(axis=1)
+            visited = walked(nodes, octant, lambda k, missed=missed: not missed[k])
+            slots = nodes.slots([k for k in visited if not missed[k]])
             assert np.array_equal(np.sort(slots), np.flatnonzero(~left_out))
 
 
-def test_rays_of_an_octant_meet_the_nearer_child_first() -> None:
+def test_rays_of_an_octant_meet_the_nearer_child_first(form: str) -> None:
     """Two heaps far apart: whichever an octant's rays meet first comes first in its list."""
     for axis in range(3):
-        corners = np.concatenate([soup(1, 20), soup(2, 20) + 10.0 * np.eye(3)[axis]])
-        tree = build_hierarchy(find_backend(), single(corners))
+        corners = single(np.concatenate([soup(1, 20), soup(2, 20) + 10.0 * np.eye(3)[axis]]))
+        tree = build_hierarchy(find_backend(), corners)
         nodes = lists(tree)
+        middle = (nodes.first[0, axis] + nodes.last[0, axis]) / 2
         for octant in range(OCTANTS):
-            second = nodes[octant * len(tree.left) + 1]
-            near_origin = min(second[axis], second[4 + axis]) < 5
+            second = octant * len(tree.left) + 1
+            near_origin = min(nodes.first[second, axis], nodes.last[second, axis]) < middle
             assert near_origin == (octant >> axis & 1 == 0)
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_boxes_on_the_grid_hold_the_boxes_and_are_a_step_larger_at_most(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(grid, "ROOM", 0)
+    _, tree = built(name)
+    found = find_grid(tree)
+    assert found is not None
+    assert np.array_equal(found.low, found.low.astype(np.float32))
+    assert np.array_equal(found.step, found.step.astype(np.float32))
+    assert found.lower.max() <= grid.STEPS and found.upper.max() <= grid.STEPS
+    low, high = found.low + found.lower * found.step, found.low + found.upper * found.step
+    rounding = 4e-16 * (np.abs(low) + np.abs(high) + np.abs(found.low))
+    assert (low <= tree.lower).all() and (tree.lower <= low + 1.001 * found.step + rounding).all()
+    assert (high >= tree.upper).all() and (tree.upper >= high - 1.001 * found.step - rounding).all()
+
+
+def test_small_details_in_a_huge_scene_keep_their_boxes() -> None:
+    """On the grid a thousand triangles would share a few steps."""
+    detailed = soup(2, 1000) * 1e-5
+    far = soup(3, 4) * 1e2
+    assert find_grid(build_hierarchy(find_backend(), soup(2, 1000))) is not None
+    assert find_grid(build_hierarchy(find_backend(), single(np.concatenate([detailed, far])))) is None
 
 
 # ---- Nearest hits ------------------------------------------------------------------------------------------
@@ -362,12 +426,12 @@ RAY_MESHES: dict[str, Callable[[], Array]] = {
 
 @pytest.mark.parametrize("precision", ["single", "double"])
 @pytest.mark.parametrize("name", RAY_MESHES)
-def test_nearest_hits_are_those_of_all_triangles(name: str, precision: str) -> None:
+def test_nearest_hits_are_those_of_all_triangles(name: str, precision: str, form: str) -> None:
     compare_with_all(RAY_MESHES[name](), 3, 4000, precision)
 
 
 @pytest.mark.parametrize("scale", [1e17, 1e-30])
-def test_nearest_hits_at_the_ends_of_single_precision(scale: float) -> None:
+def test_nearest_hits_at_the_ends_of_single_precision(scale: float, form: str) -> None:
     compare_with_all(single(soup(7, 40, 1.0) * scale), 3, 4000, "double")
 
 
@@ -430,19 +494,16 @@ def hard_rays(seed: int, n: int, corners: Array) -> tuple[Array, Array]:
 def compare_with_open_boxes(corners: Array, seed: int, n: int, precision: str) -> None:
     """Every ray: the hit is bit for bit that of the same tests on all triangles, no box missed."""
 
-    def opened(backend: Backend, tree: Hierarchy) -> Any:
-        nodes = lists(tree).copy()
-        for octant, rows in enumerate(np.split(nodes, OCTANTS)):
-            rows[:, :3] = [np.inf if octant >> k & 1 else -np.inf for k in range(3)]
-            rows[:, 4:7] = -rows[:, :3]
-        return backend.single_table(nodes)
+    def open_box(slabs: Any, node: Any, limit: Any) -> Any:
+        return limit == limit
 
     scene = scene_of(corners)
     for rays_of in (rays, hard_rays):
         o, d = rays_of(seed, n, corners)
         found = tracer.intersect(scene, o, d, precision=precision)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(device_meshes, "threaded", opened)
+            patch.setattr(traverse.Slabs, "crossed", open_box)
+            patch.setattr(device_meshes, "threaded", threaded)
             everything = tracer.intersect(scene, o, d, precision=precision)
         assert 0.1 < everything.valid.mean()
         different = (found.primitive != everything.primitive) | ((found.t != everything.t) & found.valid)
@@ -453,7 +514,7 @@ def compare_with_open_boxes(corners: Array, seed: int, n: int, precision: str) -
 
 @pytest.mark.parametrize("precision", ["single", "double"])
 @pytest.mark.parametrize("name", SOUPS)
-def test_boxes_never_change_a_hit(name: str, precision: str) -> None:
+def test_boxes_never_change_a_hit(name: str, precision: str, form: str) -> None:
     compare_with_open_boxes(SOUPS[name](21), 4, 3000, precision)
 
 
@@ -466,37 +527,41 @@ def test_grazing_hits_anywhere_along_the_ray_are_caught(monkeypatch: pytest.Monk
 @pytest.mark.slow
 @pytest.mark.parametrize("precision", ["single", "double"])
 @pytest.mark.parametrize("name", SOUPS)
-def test_boxes_never_change_a_hit_of_many_soups(name: str, precision: str) -> None:
+def test_boxes_never_change_a_hit_of_many_soups(name: str, precision: str, form: str) -> None:
     for seed in range(30, 34):
         compare_with_open_boxes(SOUPS[name](seed), seed, 20_000, precision)
 
 
-def jump_too_far(nodes: Array) -> None:
+def jump_too_far(nodes: Lists) -> None:
     """Every other jump skips a node more."""
-    bits, count = nodes.view(np.uint32), len(nodes) // OCTANTS
-    ends = (np.arange(len(bits)) // count + 1) * count
-    bits[:, 3] = np.minimum(bits[:, 3] + bits[:, 3] % 2, ends)
+    count = len(nodes.link) // OCTANTS
+    ends = (np.arange(len(nodes.link)) // count + 1) * count
+    further = np.minimum(nodes.link + nodes.link % 2, ends)
+    nodes.link[:] = np.where(nodes.link < LEAF, further, nodes.link)
 
 
-def boxes_too_small(nodes: Array) -> None:
-    nodes[:, 0:3] += 0.01 * (nodes[:, 4:7] - nodes[:, 0:3])
+def boxes_too_small(nodes: Lists) -> None:
+    less = 0.01 * (nodes.last.astype(np.float64) - nodes.first)
+    nodes.first[:] = (nodes.first + less).astype(nodes.first.dtype)
 
 
-def planes_swapped(nodes: Array) -> None:
-    nodes[:, [0, 4]] = nodes[:, [4, 0]]
+def planes_swapped(nodes: Lists) -> None:
+    nodes.first[:, 0], nodes.last[:, 0] = nodes.last[:, 0].copy(), nodes.first[:, 0].copy()
 
 
-def leaf_one_short(nodes: Array) -> None:
-    bits = nodes.view(np.uint32)
-    bits[:, 7] -= (bits[:, 7] & 7) > 1
+def leaf_one_short(nodes: Lists) -> None:
+    nodes.link -= ((nodes.link >= LEAF) & (nodes.link & 7 > 1)).astype(np.uint32)
 
 
 @pytest.mark.parametrize("damage", [jump_too_far, boxes_too_small, planes_swapped, leaf_one_short])
-def test_planted_error_is_caught(damage: Callable[[Array], None], monkeypatch: pytest.MonkeyPatch) -> None:
-    def damaged(backend: Backend, tree: Hierarchy) -> Any:
-        nodes = lists(tree).copy()
+def test_planted_error_is_caught(
+    damage: Callable[[Lists], None], monkeypatch: pytest.MonkeyPatch, form: str
+) -> None:
+    def damaged(backend: Backend, tree: Hierarchy) -> NodeLists:
+        found = threaded(backend, tree)
+        nodes = Lists.of(found)
         damage(nodes)
-        return backend.single_table(nodes)
+        return nodes.on_device(found)
 
     monkeypatch.setattr(device_meshes, "threaded", damaged)
     with pytest.raises(AssertionError):

@@ -16,9 +16,10 @@ from typing import Any
 
 import drjit as dr
 
-from tracer.acceleration.traverse import SMALLEST_COMPONENT
-from tracer.acceleration.triangle import CONTACT_SLACK, Triangle
-from tracer.acceleration.walk import Node, TriangleTables, fetch_node, octant_of, walk
+from tracer.acceleration.layout import NodeLists
+from tracer.acceleration.slabs import SMALLEST_COMPONENT
+from tracer.acceleration.triangle import CONTACT_SLACK, Triangle, TriangleTables, fetch_triangle
+from tracer.acceleration.walk import Node, fetch_node, octant_of, walk
 from tracer.backends import Backend
 from tracer.ray import max_abs, select_max, select_min
 from tracer.shafts import Shaft
@@ -37,22 +38,23 @@ def look_along(
 
     `normal`: unit normal (3, n) on the lit side of the surface at the shafts' apex; `primitive`: its id.
     """
-    slabs = _Slabs.of(backend, tables, shaft)
-    root = fetch_node(backend, tables, slabs.octant * tables.count)
+    slabs = _Slabs.of(backend, tables.lists, shaft)
+    root = fetch_node(backend, tables.lists, slabs.octant * tables.lists.count)
 
     def look(verdict: Any) -> tuple[Any]:
-        def test(triangle: Triangle, number: Any, verdict: Any) -> Any:
+        def test(slot: Any, verdict: Any) -> Any:
+            triangle, number = fetch_triangle(backend, tables.rows, slot)
             return dr.select(number != primitive, _meet(backend, triangle, shaft, normal), verdict)
 
         return (
             walk(
                 backend,
-                tables,
+                tables.lists,
                 slabs.octant,
                 crosses=lambda node, verdict: slabs.crossed(node),
                 test=test,
-                done=lambda verdict: verdict != CLEAR,
                 state=verdict,
+                done=lambda verdict: verdict != CLEAR,
             ),
         )
 
@@ -112,8 +114,8 @@ class _Slabs:
     narrows: Any
 
     @staticmethod
-    def of(backend: Backend, tables: TriangleTables, shaft: Shaft) -> _Slabs:
-        pad = 2 * CONTACT_SLACK * backend.epsilon * (max_abs(shaft.apex) + tables.extent)
+    def of(backend: Backend, lists: NodeLists, shaft: Shaft) -> _Slabs:
+        pad = 2 * CONTACT_SLACK * backend.epsilon * (max_abs(shaft.apex) + lists.extent)
         octant = octant_of(backend, shaft.axis)
         sign = backend.Vector3(*(dr.select(d < 0, backend.Float(-1), 1) for d in shaft.axis))
         length = dr.abs(shaft.axis)
@@ -122,12 +124,13 @@ class _Slabs:
         difference = length - shaft.radius
         narrows = difference > tiny  # else the limit is one on how early the shaft can be inside
         inverse_last = dr.rcp(dr.select(narrows, difference, select_min(difference, -tiny)))
-        start = -sign * shaft.apex
+        low, step = (0, 1) if lists.grid is None else (lists.grid.low, lists.grid.step)
+        start = sign * (low - shaft.apex)
         return _Slabs(
             octant=octant,
-            rate_first=sign * inverse_first,
+            rate_first=sign * step * inverse_first,
             shift_first=(start - pad) * inverse_first,
-            rate_last=sign * inverse_last,
+            rate_last=sign * step * inverse_last,
             shift_last=(start + pad) * inverse_last,
             narrows=narrows,
         )

@@ -58,6 +58,13 @@ def doubtful(departure: Departure, test: TriangleTest) -> Any:
     return departure.active & (through_origin | in_tangent_plane)
 
 
+def may_be_doubtful(departure: Departure, test: TriangleTest, rounding: Any) -> Any:
+    """Mask: `doubtful` may say so; cheaper, with a bound on every triangle's rounding."""
+    # Planes behind the ray are no matter: `meet_near_origin` never accepts them.
+    in_tangent_plane = dr.abs(test.t) * departure.climb <= rounding
+    return departure.active & ((dr.abs(test.height) <= rounding) | in_tangent_plane)
+
+
 def meet_near_origin(
     departure: Departure, ray: Ray, triangle: Triangle, test: TriangleTest
 ) -> tuple[Any, Any]:

@@ -4,10 +4,14 @@ A copy lists the nodes depth first, the child that rays of its octant meet first
 meets a node's box goes on with the next node of the list, a ray that misses it jumps over the whole subtree:
 no stack. Planes are stored in the order in which those rays cross them (Smits, Efficiency Issues for Ray
 Tracing, 1998).
+
+Planes are whole numbers of 16 bits, steps of a grid over the root, rounded outwards (`grid.py`): a node has
+16 bytes. Where the grid is too coarse for a part of the scene, planes stay floats, and a node has 32.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -15,49 +19,90 @@ import drjit as dr
 import numpy as np
 
 from tracer.acceleration.build import Hierarchy
+from tracer.acceleration.grid import Grid, find_grid
 from tracer.backends import Backend
-
-NODE_WORDS = 8
-"""Words of 32 bits of a node: three planes crossed first, where to jump, three planes crossed last, and for a
-leaf its first triangle slot times 8 plus their number, else 0."""
 
 OCTANTS = 8
 """Octant o holds the directions whose component k is negative where bit k of o is set."""
 
+GRID_WORDS, FLOAT_WORDS = 4, 8
+"""Words of 32 bits of a node. On a grid: for each axis the plane crossed first in the low half of a word and
+the one crossed last in the high half, then the link. Else: the planes crossed first as floats, the link, the
+planes crossed last, 0."""
 
-def threaded(backend: Backend, tree: Hierarchy) -> Any:
-    """Eight lists of n nodes, `NODE_WORDS` words each, flat and in single precision; some words are bit
-    patterns of unsigned integers."""
-    n = len(tree.left)
+LEAF = 1 << 31
+"""The link of a leaf is this, 8 times its first slot, and how many slots it has (1 to 7); a ray goes on with
+the next node in either case. The link of any other node is where a ray goes on that misses it."""
+
+
+@dataclass
+class NodeLists:
+    """Eight lists of `count` (width 1) nodes each, in Dr.Jit memory, and one node that nobody reads for its
+    content: lanes at the end of the last list fetch it. `grid`: the unit of the planes, None where they are
+    floats; `extent` (width 1): the largest |coordinate|."""
+
+    words: Any
+    count: Any
+    grid: Grid | None
+    extent: Any
+
+
+def threaded(backend: Backend, tree: Hierarchy) -> NodeLists:
+    """The lists of a tree."""
     sizes = _subtree_sizes(tree)
-    rows = np.empty((n, NODE_WORDS), np.float32)
+    found = find_grid(tree)
+    links = np.where(tree.left == 0, LEAF | tree.first << 3 | tree.count, sizes).astype(np.uint32)
+    count = backend.opaque_id(len(tree.left))
+    places = backend.id_table(_places(tree, sizes).T)
+    if found is None:
+        words = _written(backend, backend.id_table(_float_rows(tree, links)), places, count, FLOAT_WORDS)
+    else:
+        words = _written(backend, backend.id_table(found.rows(tree, links)), places, count, GRID_WORDS)
+    return NodeLists(
+        words=words,
+        count=count,
+        grid=None if found is None else found.on_device(backend),
+        extent=backend.opaque(max(-tree.lower[0].min(), tree.upper[0].max())),
+    )
+
+
+def _float_rows(tree: Hierarchy, links: np.ndarray) -> np.ndarray:
+    rows = np.zeros((len(links), FLOAT_WORDS), np.float32)
     rows[:, 0:3], rows[:, 4:7] = tree.lower, tree.upper
-    rows.view(np.uint32)[:, 3] = sizes
-    rows.view(np.uint32)[:, 7] = np.where(tree.left == 0, tree.first << 3 | tree.count, 0)
-    table, places = backend.single_table(rows), backend.id_table(_places(tree, sizes).T)
-    return _written(backend, table, places, backend.opaque_id(n))
+    rows = rows.view(np.uint32)
+    rows[:, 3] = links
+    return rows
 
 
 @dr.syntax
-def _written(backend: Backend, rows: Any, places: Any, n: Any) -> Any:
+def _written(backend: Backend, rows: Any, places: Any, n: Any, node_words: int) -> Any:
     """Writes every node into each list, its planes in the order in which they are crossed."""
-    node = dr.arange(backend.UInt32, dr.width(rows) // NODE_WORDS)
-    words = dr.gather(backend.SingleN, rows, node, shape=(NODE_WORDS, dr.width(node)))
-    size = dr.reinterpret_array(backend.UInt32, words[3])
-    lists = dr.empty(type(rows), OCTANTS * dr.width(rows))
+    node = dr.arange(backend.UInt32, dr.width(rows) // node_words)
+    words = dr.gather(backend.IdN, rows, node, shape=(node_words, dr.width(node)))
+    is_leaf = words[3] >= LEAF
+    lists = dr.zeros(type(rows), OCTANTS * dr.width(rows) + node_words)
+    dr.eval(lists)
     octant = dr.zeros(backend.UInt32, dr.width(node))
     while dr.hint(octant < OCTANTS, label="octants", exclude=[backend, lists]):
         place = octant * n + dr.gather(backend.UInt32, places, octant * n + node)
-        first, last = [], []
-        for k in range(3):
-            negative = (octant & (1 << k)) != 0
-            first.append(dr.select(negative, words[4 + k], words[k]))
-            last.append(dr.select(negative, words[k], words[4 + k]))
-        jump = dr.reinterpret_array(type(rows), place + size)
-        dr.scatter(lists, backend.SingleN([*first, jump, *last, words[7]]), place)
+        link = dr.select(is_leaf, words[3], place + words[3])
+        dr.scatter(lists, backend.IdN(_crossed_in_order(octant, words, link)), place)
         octant = octant + 1
     dr.eval(lists)
     return lists
+
+
+def _crossed_in_order(octant: Any, words: Any, link: Any) -> list[Any]:
+    """The words of nodes in the list of an octant: planes that it meets from the other side change places."""
+    negative = [(octant & (1 << k)) != 0 for k in range(3)]
+    if len(words) == GRID_WORDS:
+        return [
+            *(dr.select(negative[k], words[k] << 16 | words[k] >> 16, words[k]) for k in range(3)),
+            link,
+        ]
+    first = [dr.select(negative[k], words[4 + k], words[k]) for k in range(3)]
+    last = [dr.select(negative[k], words[k], words[4 + k]) for k in range(3)]
+    return [*first, link, *last, words[7]]
 
 
 def _subtree_sizes(tree: Hierarchy) -> np.ndarray:

@@ -10,11 +10,14 @@ made in double precision.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import drjit as dr
 
+from tracer.acceleration.layout import NodeLists
 from tracer.backends import Backend
 from tracer.ray import Ray, max_abs, select_max, select_min
 
@@ -26,6 +29,15 @@ CONTACT_SLACK = 32
 """Bound on the error of a hit point, in units of eps S: 8 across its surface, and up to 4 times that along it
 when the ray arrived at a slant (cosine above 1/4). A generous bound costs nothing, since what it admits is
 decided by geometry."""
+
+
+@dataclass
+class TriangleTables:
+    """All triangles of a scene in Dr.Jit memory: `rows` of `TRIANGLE_WORDS` words each, in the order of the
+    leaves, and the hierarchy over them."""
+
+    rows: Any
+    lists: NodeLists
 
 
 @dataclass
@@ -86,50 +98,80 @@ class TriangleTest:
     """What one test finds.
 
     `t`: distance to the plane, of either sign; `within`: the line passes inside the edges or exactly through
-    one; `owned`: the same, but of two triangles that share the edge only one claims it; `touched`: the line
-    passes inside, or misses an edge by no more than rounding; `height`: signed distance of the ray's origin
-    from the plane; `speed`: rate at which it grows; `slack`: a bound on the rounding error of `height`,
-    `relative_slack` (32 eps) times the largest coordinate of the origin and of the corners seen from it.
+    one; `height`: signed distance of the ray's origin from the plane; `speed`: rate at which it grows. The
+    rest is seldom asked for, and computed when it is: `corners` of the triangle seen from the origin,
+    `projected` across the ray, and `edges`, their edge functions.
     """
 
     t: Any
     within: Any
-    owned: Any
-    touched: Any
     height: Any
     speed: Any
-    slack: Any
-    relative_slack: float
+    origin: Any
+    corners: tuple[Any, Any, Any]
+    projected: tuple[tuple[Any, Any], ...]
+    edges: tuple[Any, Any, Any]
+    epsilon: float
+
+    @property
+    def owned(self) -> Any:
+        """Mask: `within`, but of two triangles that share the edge only one claims it."""
+        (a, b, c), (e0, e1, e2) = self.projected, self.edges
+        return self.within & _owns(e0, *b, *c) & _owns(e1, *c, *a) & _owns(e2, *a, *b)
+
+    @property
+    def size(self) -> Any:
+        """The largest coordinate of the corners seen from the origin."""
+        return _largest(max_abs(corner) for corner in self.corners)
+
+    @property
+    def slack(self) -> Any:
+        """A bound on the rounding error of `height`: `relative_slack` times the largest coordinate of the
+        origin and of the corners seen from it."""
+        return self.relative_slack * select_max(self.size, max_abs(self.origin))
+
+    @property
+    def relative_slack(self) -> float:
+        """32 eps."""
+        return CONTACT_SLACK * self.epsilon
+
+    @property
+    def touched(self) -> Any:
+        """Mask: the line passes inside, or misses an edge by no more than rounding."""
+        tolerance = 2 * self.slack * self.size
+        low, high = _extremes(*self.edges)
+        return ((low >= -tolerance) | (high <= tolerance)) & (self.speed != 0)
+
+
+def largest_slack(epsilon: float, origin: Any, extent: Any) -> Any:
+    """No triangle with coordinates up to `extent` has more `slack` for rays from an origin (3, n)."""
+    return (CONTACT_SLACK + 1) * epsilon * (max_abs(origin) + extent)
 
 
 def meet_triangle(epsilon: float, triangle: Triangle, ray: Ray, axes: Projection) -> TriangleTest:
     """Where the line of the ray meets the plane of the triangle, and whether inside its edges."""
-    a, b, c = triangle.v0 - ray.o, triangle.v1 - ray.o, triangle.v2 - ray.o
-    ax, ay = dr.dot(a, axes.u), dr.dot(a, axes.v)
-    bx, by = dr.dot(b, axes.u), dr.dot(b, axes.v)
-    cx, cy = dr.dot(c, axes.u), dr.dot(c, axes.v)
-    e0 = difference_of_products(bx, cy, by, cx)
-    e1 = difference_of_products(cx, ay, cy, ax)
-    e2 = difference_of_products(ax, by, ay, bx)
-    size = select_max(select_max(max_abs(a), max_abs(b)), max_abs(c))
-    relative_slack = CONTACT_SLACK * epsilon
-    slack = relative_slack * select_max(size, max_abs(ray.o))
-    low = select_min(select_min(e0, e1), e2)
-    high = select_max(select_max(e0, e1), e2)
-    height = -dr.dot(triangle.normal, a)
+    corners = (triangle.v0 - ray.o, triangle.v1 - ray.o, triangle.v2 - ray.o)
+    a, b, c = projected = tuple((dr.dot(v, axes.u), dr.dot(v, axes.v)) for v in corners)
+    edges = (_edge(b, c), _edge(c, a), _edge(a, b))
+    low, high = _extremes(*edges)
+    height = -dr.dot(triangle.normal, corners[0])
     speed = dr.dot(triangle.normal, ray.d)
-    tolerance = 2 * slack * size
     within = ((low >= 0) | (high <= 0)) & (speed != 0)
-    return TriangleTest(
-        t=-height / speed,
-        within=within,
-        owned=within & _owns(e0, bx, by, cx, cy) & _owns(e1, cx, cy, ax, ay) & _owns(e2, ax, ay, bx, by),
-        touched=((low >= -tolerance) | (high <= tolerance)) & (speed != 0),
-        height=height,
-        speed=speed,
-        slack=slack,
-        relative_slack=relative_slack,
-    )
+    return TriangleTest(-height / speed, within, height, speed, ray.o, corners, projected, edges, epsilon)
+
+
+def _edge(start: tuple[Any, Any], end: tuple[Any, Any]) -> Any:
+    """The edge function of two projected corners."""
+    return difference_of_products(start[0], end[1], start[1], end[0])
+
+
+def _extremes(a: Any, b: Any, c: Any) -> tuple[Any, Any]:
+    """The smallest and the largest of three."""
+    return select_min(select_min(a, b), c), select_max(select_max(a, b), c)
+
+
+def _largest(values: Iterable[Any]) -> Any:
+    return reduce(select_max, values)
 
 
 def _owns(edge: Any, from_x: Any, from_y: Any, to_x: Any, to_y: Any) -> Any:

@@ -1,10 +1,10 @@
-"""The walk through the hierarchy that rays and beams share, without a stack.
+"""The walk through the hierarchy that rays, beams and bundles share, without a stack.
 
 The nodes stand in a list for every octant of directions (`layout.py`). A lane goes on to the next node where
-it meets a box, and jumps where it misses one. Nodes and triangles take turns: lanes without triangles to
-test take one step through the list, then all lanes that have one test one triangle. So no lane waits until
-its neighbors are done with a long leaf (measured: a third faster for incoherent rays than one inner loop for
-each).
+it meets a box, and jumps where it misses one. Nodes and leaves take turns: lanes without anything to test
+take `STRIDE` steps through the list, then all lanes that have something test one thing. So no lane waits
+until its neighbors are done with a long leaf (measured: a third faster for incoherent rays than one inner
+loop for each).
 """
 
 from __future__ import annotations
@@ -15,46 +15,34 @@ from typing import Any
 
 import drjit as dr
 
-from tracer.acceleration.layout import NODE_WORDS
-from tracer.acceleration.triangle import Triangle, fetch_triangle
+from tracer.acceleration.layout import FLOAT_WORDS, LEAF, NodeLists
 from tracer.backends import Backend
 
-
-@dataclass
-class TriangleTables:
-    """All triangles of a scene and the tree over them, in Dr.Jit memory.
-
-    `triangles`: `TRIANGLE_WORDS` words each, in the order of the leaves; `nodes`: eight lists of `count`
-    (width 1) nodes, `NODE_WORDS` words each; `extent` (width 1): the largest |coordinate|.
-    """
-
-    triangles: Any
-    nodes: Any
-    count: Any
-    extent: Any
+STRIDE = 2
+"""Steps between two tests. 3 are as fast for incoherent rays, slower for shadow rays, which end at a hit."""
 
 
 @dataclass
 class Node:
-    """n nodes: the planes that directions of an octant cross `first` and `last` (3, n), the node to `jump`
-    to, and the word of a `leaf` (first slot times 8 plus triangles), 0 for others."""
+    """n nodes: the planes that directions of an octant cross `first` and `last` (3, n), in units of the
+    lists, and the `link` (see `layout.LEAF`)."""
 
     first: Any
     last: Any
-    jump: Any
-    leaf: Any
+    link: Any
 
 
-def fetch_node(backend: Backend, tables: TriangleTables, node: Any) -> Node:
-    """Reads nodes from the table."""
-    words = dr.gather(backend.SingleN, tables.nodes, node, shape=(NODE_WORDS, dr.width(node)))
-    vector, word = backend.Vector3, backend.UInt32
-    return Node(
-        first=vector(words[0], words[1], words[2]),
-        last=vector(words[4], words[5], words[6]),
-        jump=dr.reinterpret_array(word, words[3]),
-        leaf=dr.reinterpret_array(word, words[7]),
-    )
+def fetch_node(backend: Backend, lists: NodeLists, node: Any) -> Node:
+    """Reads nodes from the lists."""
+    vector = backend.Vector3
+    if lists.grid is not None:
+        words = dr.gather(backend.IdVector4, lists.words, node)
+        first = vector(*(backend.Float(words[k] & 0xFFFF) for k in range(3)))
+        return Node(first, vector(*(backend.Float(words[k] >> 16) for k in range(3))), words[3])
+    words = dr.gather(backend.IdN, lists.words, node, shape=(FLOAT_WORDS, dr.width(node)))
+    single = dr.value_t(backend.SingleN)
+    first, last = (vector(*(dr.reinterpret_array(single, words[k + i]) for i in range(3))) for k in (0, 4))
+    return Node(first, last, words[3])
 
 
 def octant_of(backend: Backend, d: Any) -> Any:
@@ -67,48 +55,52 @@ def octant_of(backend: Backend, d: Any) -> Any:
 
 def walk(
     backend: Backend,
-    tables: TriangleTables,
+    lists: NodeLists,
     octant: Any,
     crosses: Callable[[Node, Any], Any],
-    test: Callable[[Triangle, Any, Any], Any],
-    done: Callable[[Any], Any],
+    test: Callable[[Any, Any], Any],
     state: Any,
+    done: Callable[[Any], Any] | None = None,
 ) -> Any:
-    """Folds the triangles of all leaves on the way into a state.
+    """Folds what lies in the leaves on the way into a state.
 
-    `crosses(node, state)`: mask, goes into the node; `test(triangle, primitive id, state)`: the next state;
-    `done(state)`: mask, ends the walk.
+    `crosses(node, state)`: mask, goes into the node; `test(slot, state)`: the next state; `done(state)`:
+    mask, ends the walk.
     """
-    begin = octant * tables.count
-    end = begin + tables.count
+    begin = octant * lists.count
+    end = begin + lists.count
 
-    def step(node: Any, slot: Any, last: Any, state: Any) -> tuple[Any, Any, Any]:
-        idle = (slot == last) & (node < end)
-        fetched = fetch_node(backend, tables, dr.select(idle, node, begin))
-        crossed, leaf = idle & crosses(fetched, state), fetched.leaf
-        slot = dr.select(crossed & (leaf != 0), leaf >> 3, slot)
-        last = dr.select(crossed & (leaf != 0), (leaf >> 3) + (leaf & 7), last)
-        return dr.select(idle, dr.select(crossed & (leaf == 0), node + 1, fetched.jump), node), slot, last
+    # A lane's leaf is 0 or counts down: LEAF + 8 slot + how many are left.
+    def step(node: Any, leaf: Any, state: Any) -> tuple[Any, Any]:
+        fetched = fetch_node(backend, lists, node)
+        walks = ((leaf & 7) == 0) & (node < end)
+        crossed = walks & crosses(fetched, state)
+        is_leaf = fetched.link >= LEAF
+        goes_on = dr.select(crossed | is_leaf, node + 1, fetched.link)
+        return dr.select(walks, goes_on, node), dr.select(crossed & is_leaf, fetched.link, leaf)
 
-    def test_one(slot: Any, state: Any) -> tuple[Any, Any]:
-        return slot + 1, test(*fetch_triangle(backend, tables.triangles, slot), state)
+    def test_one(leaf: Any, state: Any) -> tuple[Any, Any]:
+        return leaf + 7, test((leaf & (LEAF - 1)) >> 3, state)
 
-    def body(node: Any, slot: Any, last: Any, state: Any) -> tuple[Any, Any, Any, Any]:
-        node, slot, last = step(node, slot, last, state)
-        slot, state = dr.if_stmt(
-            args=(slot, state),
-            cond=slot < last,
+    def body(node: Any, leaf: Any, state: Any) -> tuple[Any, Any, Any]:
+        for _ in range(STRIDE):
+            node, leaf = step(node, leaf, state)
+        leaf, state = dr.if_stmt(
+            args=(leaf, state),
+            cond=(leaf & 7) != 0,
             true_fn=test_one,
-            false_fn=lambda slot, state: (slot, state),
-            label="triangle",
+            false_fn=lambda leaf, state: (leaf, state),
+            label="leaf",
         )
-        finished = done(state)
-        return dr.select(finished, end, node), dr.select(finished, last, slot), last, state
+        if done is not None:
+            finished = done(state)
+            node, leaf = dr.select(finished, end, node), dr.select(finished, 0, leaf)
+        return node, leaf, state
 
     none = dr.zeros(backend.UInt32, dr.width(octant))
     *_, state = dr.while_loop(
-        state=(begin + none, none, none + 0, state),
-        cond=lambda node, slot, last, state: (node < end) | (slot < last),
+        state=(begin + none, none, state),
+        cond=lambda node, leaf, state: (node < end) | ((leaf & 7) != 0),
         body=body,
         label="hierarchy",
     )
