@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -11,7 +13,7 @@ from tracer.errors import MachineError
 from tracer.llvm import ensure_llvm
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 
 def pytest_sessionstart() -> None:
@@ -43,6 +45,23 @@ def _drjit_state() -> Iterator[None]:
     if dr.thread_count() != threads:
         dr.set_thread_count(threads)
     dr.kernel_history_clear()
+
+
+def pytest_configure() -> None:
+    """Code that a test changes is never answered for by what was recorded before."""
+    for name in ("setattr", "delattr", "setitem", "delitem", "undo"):
+        setattr(pytest.MonkeyPatch, name, _and_forget(getattr(pytest.MonkeyPatch, name)))
+
+
+def _and_forget(change: Callable[..., Any]) -> Callable[..., Any]:
+    @functools.wraps(change)
+    def changed(*arguments: Any, **keywords: Any) -> Any:
+        result = change(*arguments, **keywords)
+        if "tracer.replay" in sys.modules:
+            sys.modules["tracer.replay"].forget_recordings()
+        return result
+
+    return changed
 
 
 @pytest.fixture(scope="session")

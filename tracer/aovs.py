@@ -3,7 +3,7 @@ loop."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import drjit as dr
@@ -57,7 +57,7 @@ LAYERS: dict[str, Layer] = {
 
 
 def compute_layers(
-    scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, found: PixelColumns, names: list[str]
+    scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, found: PixelColumns, names: Sequence[str]
 ) -> dict[str, Any]:
     """Values of the layers for the pixels of a launch; NaN and -1 where nothing was hit."""
     backend = scene.backend

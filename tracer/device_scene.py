@@ -19,6 +19,7 @@ from tracer.errors import SceneError
 from tracer.light_tables import LightTables, compile_lights
 from tracer.material import Material
 from tracer.ray import SIDE_BITS
+from tracer.replay import NOT_IN_KERNELS
 from tracer.scene import Scene
 from tracer.shafts import Enclosure
 from tracer.shapes import Plane, ShapeRecord, Sphere
@@ -98,7 +99,7 @@ class DeviceScene:
     cutoff: Any
     max_depth: Any
     stack_size: int
-    host: HostScene
+    host: HostScene = field(metadata=NOT_IN_KERNELS)
 
 
 def compile_scene(scene: Scene, backend: Backend) -> DeviceScene:

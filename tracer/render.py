@@ -6,7 +6,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 import drjit as dr
@@ -20,6 +20,7 @@ from tracer.device_scene import DeviceScene, compile_scene
 from tracer.film.depth_of_field import depth_of_field, rectangle_needed
 from tracer.film.film import Film
 from tracer.film.result import Result
+from tracer.replay import Program
 from tracer.scene import Scene
 from tracer.settings import RAYS_PER_BAND, Settings, picture_canvas, picture_rectangle, with_seed
 from tracer.tiles import Band, Rectangle, bands, lane_pixels
@@ -126,30 +127,20 @@ class _Job:
 
     def _trace_band(self, film: Film, band: Band) -> None:
         backend = self.backend
-        column, row, active = lane_pixels(backend, band)
-        full_column = column + backend.opaque_id(band.x0)
-        full_row = row + backend.opaque_id(band.y0)
-        pixels = PixelGrid(
-            column=full_column,
-            row=full_row,
-            number=full_row * backend.opaque_id(self.canvas.width) + full_column,
+        place = BandPlace(
+            x0=backend.opaque_id(band.x0),
+            y0=backend.opaque_id(band.y0),
+            width=backend.opaque_id(self.canvas.width),
             n=backend.opaque_id(self.n),
-            active=active,
         )
-        found = trace_pixels(self.device, self.device_canvas, pixels)
-        layers = {"color": found.color, "alpha": found.coverage, "depth": found.depth, "z": found.view_depth}
-        if self.layers:
-            dr.eval(found)
-            layers |= compute_layers(self.device, self.device_canvas, pixels, found, self.layers)
-        index = row * backend.opaque_id(band.width) + column
-        picture = {name: _scattered(values, index, active, band) for name, values in layers.items()}
-        totals = _totals(backend, found.counts)
-        dr.eval(picture, totals)
-        film.take(band, {name: values.numpy() for name, values in picture.items()})
+        size = (band.width, band.height)
+        found = trace_band(self.device, self.device_canvas, place, size, tuple(self.layers))
+        totals = {name: int(found.pop(name).numpy()[0]) for name in COUNTERS}
+        film.take(band, {name: values.numpy() for name, values in found.items()})
         film.counts["primary"] += band.width * band.height * self.n**2
         for name, total in totals.items():
             merge = max if name == "deepest_level" else int.__add__
-            film.counts[name] = merge(film.counts[name], int(total.numpy()[0]))
+            film.counts[name] = merge(film.counts[name], total)
 
     def _filtered(self, film: Film) -> Film:
         """The film after the depth-of-field filter; a crop's first pass is widened to what the filter
@@ -205,13 +196,48 @@ def scene_hash(scene: Scene) -> str:
     return hashlib.sha256(json.dumps(scene.to_dict(), sort_keys=True).encode()).hexdigest()
 
 
-def _scattered(value: Any, index: Any, active: Any, band: Band) -> Any:
+@dataclass
+class BandPlace:
+    """Where a band lies: its first column and row, the `width` of the full picture; `n`: each pixel is the
+    mean of n x n sub-rays. Width-1 numbers."""
+
+    x0: Any
+    y0: Any
+    width: Any
+    n: Any
+
+
+@Program
+def trace_band(
+    device: DeviceScene,
+    canvas: DeviceCanvas,
+    place: BandPlace,
+    size: tuple[int, int],
+    layers: tuple[str, ...],
+) -> dict[str, Any]:
+    """The layers of a band of `size` columns and rows, pixels in the order of the picture, components last,
+    and the counters of `COUNTERS` (1,)."""
+    backend = device.backend
+    column, row, active = lane_pixels(backend, *size)
+    full_column, full_row = column + place.x0, row + place.y0
+    pixels = PixelGrid(full_column, full_row, full_row * place.width + full_column, place.n, active)
+    found = trace_pixels(device, canvas, pixels)
+    values = {"color": found.color, "alpha": found.coverage, "depth": found.depth, "z": found.view_depth}
+    if layers:
+        dr.eval(found)
+        values |= compute_layers(device, canvas, pixels, found, layers)
+    index = row * backend.opaque_id(size[0]) + column
+    picture = {name: _scattered(value, index, active, size) for name, value in values.items()}
+    return picture | _totals(backend, found.counts)
+
+
+def _scattered(value: Any, index: Any, active: Any, size: tuple[int, int]) -> Any:
     """Values of lanes (components, n) in the order of the picture, components last.
 
     Each pixel is written by the one lane that owns it: no atomics.
     """
     components = [value] if dr.depth_v(value) == 1 else list(value)
-    target = dr.empty(type(components[0]), band.width * band.height * len(components))
+    target = dr.empty(type(components[0]), size[0] * size[1] * len(components))
     for k, component in enumerate(components):
         dr.scatter(target, component, index * len(components) + k, active, mode=dr.ReduceMode.Permute)
     return target

@@ -56,10 +56,10 @@ def _tiles_across(width: int) -> int:
     return max(2, -(-width // TILE))
 
 
-def lane_pixels(backend: Backend, band: Band) -> tuple[Any, Any, Any]:
-    """Column and row within the band of every lane, and the mask of lanes that own a pixel."""
-    across = _tiles_across(band.width)
-    lanes = across * -(-band.height // TILE) * _PIXELS
+def lane_pixels(backend: Backend, width: int, height: int) -> tuple[Any, Any, Any]:
+    """Column and row within a band of that size of every lane, and the mask of lanes that own a pixel."""
+    across = _tiles_across(width)
+    lanes = across * -(-height // TILE) * _PIXELS
     lane = dr.arange(backend.UInt32, lanes)
     tile, place = lane >> 6, lane & (_PIXELS - 1)
     # tile // across as a multiplication: exact while tiles times across stays below 2^32, as a band's do
@@ -67,7 +67,7 @@ def lane_pixels(backend: Backend, band: Band) -> tuple[Any, Any, Any]:
     tile_column = tile - tile_row * backend.opaque_id(across)
     column = (tile_column << 3) + _even_bits(place)
     row = (tile_row << 3) + _even_bits(place >> 1)
-    active = (column < backend.opaque_id(band.width)) & (row < backend.opaque_id(band.height))
+    active = (column < backend.opaque_id(width)) & (row < backend.opaque_id(height))
     return column, row, active
 
 

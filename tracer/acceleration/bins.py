@@ -56,14 +56,16 @@ def fetch_centroid(table: Any, slot: Any, axis: Any) -> Any:
     return dr.gather(type(table), table, at) + dr.gather(type(table), table, at + 3)
 
 
-def clear_bins(bins: Any, zero: Any) -> None:
+def clear_bins(bins: Any, zero: Any, start: Any) -> None:
     """Empties bins in local memory. `zero`: 0 at full width; local memory written at width 1 is garbage in a
-    loop."""
+    loop. `start`: 0 at width 1, in memory, for Dr.Jit loses some host memory with every write whose place is
+    a literal."""
     for k in range(BINS):
+        at = start + BOX_WORDS * k
         for word in range(3):
-            bins[BOX_WORDS * k + word] = zero + dr.inf
-            bins[BOX_WORDS * k + 3 + word] = zero - dr.inf
-        bins[BOX_WORDS * k + COUNT] = zero
+            bins[at + word] = zero + dr.inf
+            bins[at + 3 + word] = zero - dr.inf
+        bins[at + COUNT] = zero
 
 
 def count_in_bin(bins: Any, number: Any, box: Any) -> None:
@@ -122,7 +124,7 @@ def chunk_bins(backend: Backend, table: Any, begin: Any, end: Any, cut: Cut) -> 
     n = dr.width(begin)
     bins = dr.alloc_local(type(table), BINS * BOX_WORDS)
     slot = backend.UInt32(begin)
-    clear_bins(bins, dr.zeros(type(table), n))
+    clear_bins(bins, dr.zeros(type(table), n), backend.opaque_id(0))
     while dr.hint(slot < end, label="bins", exclude=[backend]):
         count_in_bin(
             bins, cut.bin(backend, fetch_centroid(table, slot, cut.axis)), fetch_box(backend, table, slot)

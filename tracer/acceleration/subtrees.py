@@ -53,11 +53,13 @@ def build_subtrees(backend: Backend, table: Any, first: Any, count: Any) -> tupl
     while dr.hint(slot < count, label="fill", exclude=[backend]):
         order[slot] = slot
         slot = slot + 1
-    node, nodes = dr.zeros(word, n), dr.full(word, 1, n)
-    ranges[node] = word(count)
-    while dr.hint(node < nodes, label="nodes", exclude=[backend, left_of, leaf_of]):
+    node, nodes, start = dr.zeros(word, n), dr.full(word, 1, n), backend.opaque_id(0)
+    ranges[start] = word(count)
+    while dr.hint(node < nodes, label="nodes", exclude=[backend, start, left_of, leaf_of]):
         begin, size = ranges[node] >> 8, ranges[node] & 0xFF
-        cut, cost, area, bins, tails = _best_cut(backend, table, first, order, begin, size, bins, tails)
+        cut, cost, area, bins, tails = _best_cut(
+            backend, table, first, order, begin, size, bins, tails, start
+        )
         triangles = type(table)(size)
         split = (size > LARGEST_LEAF) | ((size > 1) & (cost + NODE_COST * area < triangles * area))
         middle, order = _part(backend, table, first, order, begin, dr.select(split, size, 0), cut)
@@ -79,7 +81,15 @@ def build_subtrees(backend: Backend, table: Any, first: Any, count: Any) -> tupl
 
 @dr.syntax
 def _best_cut(
-    backend: Backend, table: Any, first: Any, order: Any, begin: Any, size: Any, bins: Any, tails: Any
+    backend: Backend,
+    table: Any,
+    first: Any,
+    order: Any,
+    begin: Any,
+    size: Any,
+    bins: Any,
+    tails: Any,
+    start: Any,
 ) -> tuple[Cut, Any, Any, Any, Any]:
     """The cheapest cut of a node, area times triangles of its sides added up (infinite where nothing tells
     the triangles apart), the node's half area, and the local memory for bins as it is then."""
@@ -88,7 +98,7 @@ def _best_cut(
     axis, end = dr.zeros(word, n), begin + size
     best = Cut(dr.zeros(word, n), zero + 0, zero + 0, dr.zeros(word, n))
     least, area = zero + dr.inf, zero + 0
-    while dr.hint((axis < 3) & (size > 1), label="axes", exclude=[backend]):
+    while dr.hint((axis < 3) & (size > 1), label="axes", exclude=[backend, start]):
         slot = word(begin)
         low, high = zero + dr.inf, zero - dr.inf
         while dr.hint(slot < end, label="extents", exclude=[backend]):
@@ -98,7 +108,7 @@ def _best_cut(
         apart = high - low
         scale = dr.select(apart > SMALLEST_EXTENT, BINS / apart, 0)
         cut = Cut(axis, low, scale, word(axis))
-        clear_bins(bins, zero)
+        clear_bins(bins, zero, start)
         slot = word(begin)
         while dr.hint(slot < end, label="bins", exclude=[backend]):
             at = first + order[slot]
