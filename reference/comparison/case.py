@@ -99,7 +99,10 @@ class Case:
     @cached_property
     def ours(self) -> tracer.Hits:
         """Our hits of the rays of the bench."""
-        rays = self.bench.rays
+        return self.intersect(self.bench.rays)
+
+    def intersect(self, rays: RaySet) -> tracer.Hits:
+        """Our hits of other rays."""
         return tracer.intersect(
             self.bench.scene, rays.o, rays.d, precision=self.precision, backend=self.backend
         )

@@ -263,6 +263,19 @@ def mitsuba_normals_flipped(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(MitsubaScene, "intersect", flipped)
 
 
+def mitsuba_not_robust(patch: pytest.MonkeyPatch) -> None:
+    """Embree's quick tests of triangles, which let rays through edges."""
+    true = mitsuba_scene.build
+
+    def build(scene: tracer.Scene, *rest: Any) -> MitsubaScene:
+        built = true(scene, *rest)
+        mi = mitsuba_scene.mitsuba()
+        shapes = {f"shape{k}": shape for k, shape in enumerate(built.scene.shapes())}
+        return replace(built, scene=mi.load_dict({"type": "scene", **shapes}, optimize=False))
+
+    patch.setattr(mitsuba_scene, "build", build)
+
+
 CATCHES: list[tuple[Plant, str, str, str]] = [
     (normal_flipped, "normal, sphere", "double", "ours"),
     (normal_flipped, "normal, sphere", "single", "ours"),
@@ -300,6 +313,7 @@ CATCHES: list[tuple[Plant, str, str, str]] = [
     (mitsuba_hits_too_far, "distance, sphere", "double", "mitsuba"),
     (mitsuba_hits_too_far, "chain growth", "double", "mitsuba"),
     (mitsuba_normals_flipped, "normal, mesh", "single", "mitsuba"),
+    (mitsuba_not_robust, "edges and corners", "single", "mitsuba"),
 ]
 
 
