@@ -167,7 +167,7 @@ def _dark_samples(
         return dark
     suspects, todo = [], dr.zeros(backend.UInt32, width)
     for light, faces, is_area in zip(lights, facing, areas, strict=True):
-        who = find_suspects(scene, surface, light.ball, faces, spheres=is_area)
+        who = find_suspects(scene, surface, light.ball, faces, spheres=is_area, beams=is_area)
         bits = ((1 << len(light.samples)) - 1) << light.first
         todo |= dr.select(faces & who.doubtful, backend.UInt32(bits), 0)
         dark |= dr.select(who.umbra, backend.UInt32(bits), 0)
@@ -205,7 +205,8 @@ def _looped(
         def next_light(who: Suspects, shift: Any) -> tuple[Suspects, Any]:
             if lights.jitter:
                 shift = jitter_shift(backend, lights, number, pixel, sub_ray)
-            return find_suspects(scene, surface, fetch_ball(backend, lights, number), active), shift
+            ball = fetch_ball(backend, lights, number)
+            return find_suspects(scene, surface, ball, active, spheres=True, beams=lights.areas), shift
 
         who, shift = dr.if_stmt(
             args=(who, shift),

@@ -51,8 +51,8 @@ class LightTables:
 
     `rows`: `ROW` floats a sample (without jitter `base` is the position); `kinds`, `lights`: its kind and the
     number of its light; `sides`, `decided`: its bits for the planes; `balls`: 4 floats a light, the ball that
-    holds its samples; `count`: width-1; `jitter`: some light has it; `unrolled`: all lights one by one, when
-    they are few and none jitters.
+    holds its samples; `count`: width-1; `jitter`, `areas`: some light has jitter, several samples;
+    `unrolled`: all lights one by one, when they are few and none jitters.
     """
 
     rows: Any
@@ -64,6 +64,7 @@ class LightTables:
     count: Any
     seed: Any
     jitter: bool
+    areas: bool
     unrolled: list[UnrolledLight] | None
 
 
@@ -105,6 +106,7 @@ def compile_lights(
         count=backend.opaque_id(count),
         seed=backend.opaque_id(seed & 0xFFFFFFFF),
         jitter=jitters,
+        areas=any(len(block) > 1 for block in blocks),
         unrolled=_unrolled(backend, table[:count], owners, balls, sides, decided) if few else None,
     )
 

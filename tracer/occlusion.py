@@ -19,10 +19,13 @@ from tracer.shapes.sphere import SphereSlot
 
 
 def find_suspects(
-    scene: DeviceScene, surface: Surface, ball: Ball, active: Any, spheres: bool = True
+    scene: DeviceScene, surface: Surface, ball: Ball, active: Any, *, spheres: bool, beams: bool
 ) -> Suspects:
-    """Who may hide a light, whose samples the ball holds, from the points of a surface; without `spheres`
-    only the others are looked at."""
+    """Who may hide a light, whose samples the ball holds, from the points of a surface.
+
+    Without `spheres` only the others are looked at; without `beams` every mesh near the way is suspect. To
+    look along a beam pays where it stands for several shadow rays.
+    """
     backend = scene.backend
     who = Suspects.nobody(backend, dr.width(surface.p))
     shaft = Shaft.of(backend, surface.p, ball)
@@ -40,6 +43,9 @@ def find_suspects(
         near = active & _near_a_mesh(scene, surface, shaft)
         if not scene.options.transparent_shadows:
             near = near & ~who.umbra
+        if not beams:
+            who.meshes |= near
+            return who
         verdict = look_along(backend, scene.triangles, shaft, surface.lit_side, surface.primitive, near)
         who.meshes |= verdict != CLEAR
         who.umbra |= verdict == COVERED

@@ -73,7 +73,7 @@ def bounce(device: DeviceScene, o: Array, d_in: Array, d_out: Array, crosses: bo
         who = (
             Suspects.everybody(device.backend, len(o))
             if crosses
-            else find_suspects(device, surface, light, valid)
+            else find_suspects(device, surface, light, valid, spheres=True, beams=True)
         )
         blocked = hidden(device, segment, surface, who, valid)
         dr.eval(second, met, blocked)
