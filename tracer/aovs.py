@@ -11,10 +11,11 @@ import drjit as dr
 from tracer.canvas import DeviceCanvas
 from tracer.device_scene import DeviceScene
 from tracer.intersection import Surface, free_ray, surface_at
+from tracer.pixels import PixelGrid, primary_ray
 from tracer.ray import Hit
 from tracer.spawn import material_at
 from tracer.textures.tables import PICTURE, picture_coordinates
-from tracer.whitted import PixelColumns, PixelGrid, primary_ray, texture_point
+from tracer.whitted import PixelColumns, texture_point
 
 Layer = Callable[[DeviceScene, Surface, Any, Any], Any]
 """(scene, surface, primitive, mask of hits) -> values (n,) or (components, n)."""

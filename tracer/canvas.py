@@ -112,10 +112,11 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 class DeviceCanvas:
     """A canvas in a kernel: width-1 numbers that kernels read from memory.
 
-    `center` K, `x`, `y`: steps of one pixel along X and Y, `forward`: dis f, `axis`: f, `distance`: dis,
-    `half_width`, `half_height` in pixels, `offset` delta.
+    `eye` e, `center` K, `x`, `y`: steps of one pixel along X and Y, `forward`: dis f, `axis`: f, `distance`:
+    dis, `half_width`, `half_height` in pixels, `offset` delta.
     """
 
+    eye: Any
     center: Any
     x: Any
     y: Any
@@ -130,6 +131,7 @@ class DeviceCanvas:
     def of(backend: Backend, canvas: Canvas) -> DeviceCanvas:
         """Uploads a canvas; the unit of x and y is the pixel."""
         return DeviceCanvas(
+            eye=backend.opaque_vector(canvas.eye),
             center=backend.opaque_vector(canvas.center),
             x=backend.opaque_vector(canvas.x * canvas.pixel_size),
             y=backend.opaque_vector(canvas.y * canvas.pixel_size),

@@ -108,10 +108,21 @@ def _triangle_tables(
         order
     ]
     rows[:, 12], rows[:, 13] = primitives >> 16, primitives & 0xFFFF
-    tables = TriangleTables(backend.table(rows), threaded(backend, hierarchy))
+    edges = _longest_edges(corners)
+    rows[:, 14] = edges[hierarchy.order]
+    middle = (hierarchy.lower[0].astype(np.float64) + hierarchy.upper[0]) / 2
+    tables = TriangleTables(
+        backend.table(rows), threaded(backend, hierarchy), middle, float(np.median(edges))
+    )
     slots = np.full(sum(len(mesh.corners) for mesh in meshes.values()), -1)
     slots[order] = np.arange(len(order))
     return tables, slots
+
+
+def _longest_edges(corners: np.ndarray) -> np.ndarray:
+    """(n,) from corners (n, 3, 3)."""
+    edges = corners - np.roll(corners, 1, axis=1)
+    return np.asarray(np.sqrt((edges.astype(np.float64) ** 2).sum(axis=-1)).max(axis=-1))
 
 
 def _enclosures(backend: Backend, meshes: dict[int, PlacedMesh]) -> list[Enclosure]:

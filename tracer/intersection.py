@@ -12,7 +12,7 @@ from typing import Any
 import drjit as dr
 
 from tracer.acceleration.departure import Departure, Ground
-from tracer.acceleration.traverse import visit_triangles
+from tracer.acceleration.traverse import distance_to, visit_triangles
 from tracer.acceleration.triangle import gather_triangle
 from tracer.backends import INVALID
 from tracer.device_scene import KIND_UNIT, MESH, PLANE, SPHERE, DeviceScene
@@ -72,7 +72,18 @@ def plane_sides(scene: DeviceScene, o: Any, d: Any) -> Any:
     return sides
 
 
-def closest_hit(scene: DeviceScene, ray: Ray, active: Any, t_max: Any = None) -> Hit:
+@dataclass
+class Known:
+    """What is known of rays before they are traced: `mask` (n,) of those whose nearest triangle is, and its
+    `primitive` (n,), `INVALID` for none."""
+
+    mask: Any
+    primitive: Any
+
+
+def closest_hit(
+    scene: DeviceScene, ray: Ray, active: Any, t_max: Any = None, known: Known | None = None
+) -> Hit:
     """The smallest t > 0 (at most `t_max` when given); of equal ones the lower shape, then the lower
     primitive."""
     hit = no_hit(scene.backend, dr.width(ray.d))
@@ -83,17 +94,51 @@ def closest_hit(scene: DeviceScene, ray: Ray, active: Any, t_max: Any = None) ->
     if scene.sphere_table is not None:
         hit = scene.sphere_table.closest(ray, hit, active)
     if scene.triangles is not None:
-        hit = visit_triangles(
-            scene.backend,
-            scene.triangles,
-            ray,
-            lambda: departure(scene, ray),
-            state=hit,
-            limit=lambda hit: hit.t,
-            visit=lambda hit, t, primitive, _test, valid: keep_nearer(hit, t, valid, primitive),
-            active=active,
-        )
-    return Hit(hit.t, dr.select(active, hit.primitive, INVALID))
+        if known is not None:
+            hit = _known_triangle(scene, ray, hit, active & known.mask, known.primitive)
+            active = active & ~known.mask
+        hit = _closest_triangle(scene, ray, hit, active)
+    return hit
+
+
+def closest_triangle(scene: DeviceScene, ray: Ray, active: Any) -> Hit:
+    """The same among triangles alone."""
+    return _closest_triangle(scene, ray, no_hit(scene.backend, dr.width(ray.d)), active)
+
+
+def _closest_triangle(scene: DeviceScene, ray: Ray, hit: Hit, active: Any) -> Hit:
+    """The nearest of a hit and all triangles."""
+    assert scene.triangles is not None
+    return visit_triangles(
+        scene.backend,
+        scene.triangles,
+        ray,
+        lambda: departure(scene, ray),
+        state=hit,
+        limit=lambda hit: hit.t,
+        visit=lambda hit, t, primitive, _test, valid: keep_nearer(hit, t, valid, primitive),
+        active=active,
+    )
+
+
+def _known_triangle(scene: DeviceScene, ray: Ray, hit: Hit, active: Any, primitive: Any) -> Hit:
+    """The nearer of a hit and of that on a triangle that the ray is known to meet."""
+    assert scene.triangles is not None
+    backend, tables = scene.backend, scene.triangles
+
+    def meet(hit: Hit) -> tuple[Hit]:
+        triangle = gather_triangle(backend, tables.rows, _slot(scene, primitive, True))
+        t = distance_to(backend, tables.lists, ray, triangle)
+        return (keep_nearer(hit, t, True, primitive),)
+
+    (hit,) = dr.if_stmt(
+        args=(hit,),
+        cond=active & (primitive != INVALID),
+        true_fn=meet,
+        false_fn=lambda hit: (hit,),
+        label="known triangle",
+    )
+    return hit
 
 
 def shape_of(scene: DeviceScene, primitive: Any, active: Any) -> Any:

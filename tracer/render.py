@@ -6,7 +6,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any
 
 import drjit as dr
@@ -20,12 +20,14 @@ from tracer.device_scene import DeviceScene, compile_scene
 from tracer.film.depth_of_field import depth_of_field, rectangle_needed
 from tracer.film.film import Film
 from tracer.film.result import Result
+from tracer.first_hits import first_triangles
+from tracer.pixels import BandPlace, pixels_of
 from tracer.replay import Program
 from tracer.scene import Scene
 from tracer.settings import RAYS_PER_BAND, Settings, picture_canvas, picture_rectangle, with_seed
-from tracer.tiles import Band, Rectangle, bands, lane_pixels
+from tracer.tiles import Band, Rectangle, bands, lane_count
 from tracer.version import __version__
-from tracer.whitted import Counts, PixelGrid, trace_pixels
+from tracer.whitted import Counts, trace_pixels
 
 COUNTERS = tuple(f.name for f in fields(Counts))
 
@@ -134,7 +136,8 @@ class _Job:
             n=backend.opaque_id(self.n),
         )
         size = (band.width, band.height)
-        found = trace_band(self.device, self.device_canvas, place, size, tuple(self.layers))
+        first = first_triangles(self.device, self.canvas, self.device_canvas, place, size, self.n)
+        found = trace_band(self.device, self.device_canvas, place, size, first, tuple(self.layers))
         totals = {name: int(found.pop(name).numpy()[0]) for name in COUNTERS}
         film.take(band, {name: values.numpy() for name, values in found.items()})
         film.counts["primary"] += band.width * band.height * self.n**2
@@ -196,38 +199,26 @@ def scene_hash(scene: Scene) -> str:
     return hashlib.sha256(json.dumps(scene.to_dict(), sort_keys=True).encode()).hexdigest()
 
 
-@dataclass
-class BandPlace:
-    """Where a band lies: its first column and row, the `width` of the full picture; `n`: each pixel is the
-    mean of n x n sub-rays. Width-1 numbers."""
-
-    x0: Any
-    y0: Any
-    width: Any
-    n: Any
-
-
 @Program
 def trace_band(
     device: DeviceScene,
     canvas: DeviceCanvas,
     place: BandPlace,
     size: tuple[int, int],
+    first: Any,
     layers: tuple[str, ...],
 ) -> dict[str, Any]:
     """The layers of a band of `size` columns and rows, pixels in the order of the picture, components last,
-    and the counters of `COUNTERS` (1,)."""
+    and the counters of `COUNTERS` (1,). `first`: see `first_triangles`."""
     backend = device.backend
-    column, row, active = lane_pixels(backend, *size)
-    full_column, full_row = column + place.x0, row + place.y0
-    pixels = PixelGrid(full_column, full_row, full_row * place.width + full_column, place.n, active)
-    found = trace_pixels(device, canvas, pixels)
+    pixels = pixels_of(backend, place, size, dr.arange(backend.UInt32, lane_count(*size)))
+    found = trace_pixels(device, canvas, pixels, first)
     values = {"color": found.color, "alpha": found.coverage, "depth": found.depth, "z": found.view_depth}
     if layers:
         dr.eval(found)
         values |= compute_layers(device, canvas, pixels, found, layers)
-    index = row * backend.opaque_id(size[0]) + column
-    picture = {name: _scattered(value, index, active, size) for name, value in values.items()}
+    index = (pixels.row - place.y0) * backend.opaque_id(size[0]) + (pixels.column - place.x0)
+    picture = {name: _scattered(value, index, pixels.active, size) for name, value in values.items()}
     return picture | _totals(backend, found.counts)
 
 

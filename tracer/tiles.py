@@ -56,11 +56,14 @@ def _tiles_across(width: int) -> int:
     return max(2, -(-width // TILE))
 
 
-def lane_pixels(backend: Backend, width: int, height: int) -> tuple[Any, Any, Any]:
-    """Column and row within a band of that size of every lane, and the mask of lanes that own a pixel."""
+def lane_count(width: int, height: int) -> int:
+    """Lanes of a launch: all pixels of the tiles that cover a band of that size."""
+    return _tiles_across(width) * -(-height // TILE) * _PIXELS
+
+
+def lane_pixels(backend: Backend, width: int, height: int, lane: Any) -> tuple[Any, Any, Any]:
+    """Column and row of lanes (n,) within a band of that size, and the mask of those that own a pixel."""
     across = _tiles_across(width)
-    lanes = across * -(-height // TILE) * _PIXELS
-    lane = dr.arange(backend.UInt32, lanes)
     tile, place = lane >> 6, lane & (_PIXELS - 1)
     # tile // across as a multiplication: exact while tiles times across stays below 2^32, as a band's do
     tile_row = dr.mul_hi(tile, backend.opaque_id(-(-(2**32) // across)))

@@ -13,27 +13,16 @@ from typing import Any
 
 import drjit as dr
 
+from tracer.acceleration.bundles import DOUBTFUL
 from tracer.backends import INVALID, Backend
 from tracer.canvas import DeviceCanvas
 from tracer.device_scene import DeviceScene
 from tracer.direct_light import direct_light
-from tracer.intersection import Surface, closest_hit, free_ray, surface_at
+from tracer.intersection import Known, Surface, closest_hit, free_ray, surface_at
 from tracer.path import make_path, path_type
+from tracer.pixels import PixelGrid, primary_ray
 from tracer.spawn import material_at, spawn
 from tracer.textures.tables import texture_color
-
-
-@dataclass
-class PixelGrid:
-    """The pixels of a launch: `column`, `row` (n,) whole numbers, `number` (n,) row times width plus column
-    of the full picture, `n`: a pixel is the mean of n x n sub-rays (width 1), `active`: the lane owns a
-    pixel."""
-
-    column: Any
-    row: Any
-    number: Any
-    n: Any
-    active: Any
 
 
 @dataclass
@@ -71,8 +60,8 @@ class Counts:
 
 
 @dr.syntax
-def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid) -> PixelColumns:
-    """The colors, depths and ray counts of pixels."""
+def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, first: Any) -> PixelColumns:
+    """The colors, depths and ray counts of pixels. `first`: see `first_triangles`."""
     # ---- Loop state, all of it in full width ----
     backend = scene.backend
     width = dr.width(pixels.number)
@@ -91,17 +80,18 @@ def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid) ->
     counts = Counts.zero(backend, width)
     active = backend.Bool(pixels.active)
 
-    while dr.hint(active, label="whitted", exclude=[scene, canvas, pixels, backend, record]):
+    while dr.hint(active, label="whitted", exclude=[scene, canvas, pixels, first, backend, record]):
         # ---- The next sub-ray of the pixel ----
-        if dr.hint(fresh, exclude=[scene, canvas, pixels, backend, record]):
+        if dr.hint(fresh, exclude=[scene, canvas, pixels, first, backend, record]):
             path = _primary(scene, canvas, pixels, sub_ray)
 
         # ---- The nearest surface ----
-        hit = closest_hit(scene, path.ray, active)
+        is_primary = path.level == 0
+        known = _known(backend, first, sub_ray * pixels.lanes + pixels.lane, active & is_primary)
+        hit = closest_hit(scene, path.ray, active, known=known)
         surface = surface_at(scene, path.ray, hit, active)
         found = active & hit.valid
         counts.deepest_level = dr.maximum(counts.deepest_level, path.level)
-        is_primary = path.level == 0
         closer = is_primary & found & (hit.t < depth)
         hits += dr.select(is_primary & found, backend.UInt32(1), 0)
         depth = dr.select(closer, hit.t, depth)
@@ -140,11 +130,11 @@ def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid) ->
         # Never False, but the size must stand in the kernel: Dr.Jit tells kernels apart by what they do, not
         # by the size of local memory, and would take one with a smaller stack from its cache.
         fits = top < scene.stack_size
-        if dr.hint(reflects & refracts & fits, exclude=[scene, canvas, pixels, backend, record]):
+        if dr.hint(reflects & refracts & fits, exclude=[scene, canvas, pixels, first, backend, record]):
             stack.write(children.reflected, top)
             top += 1
         pops = active & ~reflects & ~refracts & (top > 0)
-        if dr.hint(pops, exclude=[scene, canvas, pixels, backend, record]):
+        if dr.hint(pops, exclude=[scene, canvas, pixels, first, backend, record]):
             top -= 1
             path = stack.read(top)
         fresh = active & ~reflects & ~refracts & ~pops
@@ -164,6 +154,14 @@ def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid) ->
     )
 
 
+def _known(backend: Backend, first: Any, number: Any, is_primary: Any) -> Known | None:
+    """What is known of primary rays; `number`: that of a ray among all of its launch."""
+    if first is None:
+        return None
+    primitive = dr.gather(backend.UInt32, first, number, is_primary)
+    return Known(is_primary & (primitive != DOUBTFUL), primitive)
+
+
 def _primary(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, sub_ray: Any) -> Any:
     """The path of a pixel's sub-ray b n + a, through (i + (a + offset)/n, j + (b + offset)/n)."""
     backend = scene.backend
@@ -176,17 +174,6 @@ def _primary(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, sub_ra
         dr.full(backend.Vector3, 1, width),
         dr.zeros(backend.UInt32, width),
     )
-
-
-def primary_ray(backend: Backend, canvas: DeviceCanvas, pixels: PixelGrid, sub_ray: Any) -> tuple[Any, Any]:
-    """Origin and direction of a sub-ray (document, section 7)."""
-    n, number = backend.Float(pixels.n), backend.Float(sub_ray)
-    # Exact for at most 64 x 64 sub-rays; a division of whole numbers costs 20 times as much.
-    b = dr.floor((number + 0.5) / n)
-    a = number - b * n
-    column = backend.Float(pixels.column) + (a + canvas.offset) / n
-    row = backend.Float(pixels.row) + (b + canvas.offset) / n
-    return canvas.ray(column, row)
 
 
 def texture_point(scene: DeviceScene, surface: Surface, active: Any) -> Any:

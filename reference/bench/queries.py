@@ -15,7 +15,7 @@ import numpy as np
 
 import tracer
 from reference.bench.frames import Check
-from reference.bench.rays import KINDS, Rays, primary, secondary
+from reference.bench.rays import EYE, KINDS, Rays, primary, secondary
 from reference.bench.records import Rate, Series
 from tracer.backends import Backend, exact_arithmetic, find_backend
 from tracer.device_scene import compile_scene
@@ -62,12 +62,12 @@ def _interleaved(mesh: str, kind: str, rays: Rays, sides: dict[str, Any], repeat
 
 
 def kernel_seconds(query: Query) -> float:
-    """How long the kernels of one call run."""
+    """How long the kernels of one call run, those between them (to sort out rays) included."""
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         dr.kernel_history_clear()
         query()
         dr.sync_thread()
-        history = dr.kernel_history((dr.KernelType.JIT,))
+        history = dr.kernel_history()
     return sum(entry["execution_time"] for entry in history) / 1e3
 
 
@@ -84,11 +84,18 @@ class Ours:
         o, d = (_vector(backend.Vector3, a) for a in (rays.o, rays.d))
         limit = None if rays.length is None else backend.Float(rays.length)
         active = dr.full(backend.Bool, True, rays.count)
+        eye = backend.opaque_vector(EYE)
         dr.eval(o, d, limit, active)
 
         def closest() -> Any:
             with exact_arithmetic():
                 hit = closest_hit(self._device, free_ray(self._device, o, d), active)
+                dr.eval(hit)
+            return hit.valid
+
+        def coherent() -> Any:
+            with exact_arithmetic():
+                hit = closest_of_neighbors(self._device, o, d, eye, active)
                 dr.eval(hit)
             return hit.valid
 
@@ -98,7 +105,28 @@ class Ours:
                 dr.eval(blocked)
             return blocked
 
-        return closest if limit is None else anything
+        if limit is not None:
+            return anything
+        return coherent if kind.startswith("primary") else closest
+
+
+def closest_of_neighbors(device: Any, o: Any, d: Any, eye: Any, active: Any) -> Any:
+    """Closest hits of rays from one eye, as the renderer finds those of its primary rays: in bundles."""
+    from tracer.acceleration.bundles import doubtful_rays, nearest_of_neighbors
+    from tracer.intersection import Known, closest_triangle
+
+    backend = device.backend
+
+    def ray_of(number: Any) -> tuple[Any, Any]:
+        return dr.gather(backend.Vector3, o, number), dr.gather(backend.Vector3, d, number)
+
+    first = nearest_of_neighbors(backend, device.triangles, eye, dr.width(d), ray_of)
+    numbers = doubtful_rays(first)
+    if len(numbers) > 0:
+        ray = free_ray(device, *ray_of(numbers))
+        found = closest_triangle(device, ray, dr.full(backend.Bool, True, len(numbers)))
+        dr.scatter(first, found.primitive, numbers)
+    return closest_hit(device, free_ray(device, o, d), active, known=Known(active, first))
 
 
 def any_triangle(device: Any, ray: Any, length: Any, active: Any) -> Any:

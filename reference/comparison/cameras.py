@@ -13,7 +13,7 @@ from reference.comparison.records import Outcome, Term
 from reference.comparison.renders import grid
 from tracer.backends import exact_arithmetic, find_backend
 from tracer.canvas import Canvas, DeviceCanvas
-from tracer.whitted import PixelGrid, primary_ray
+from tracer.pixels import PixelGrid, primary_ray
 
 Array = np.ndarray
 
@@ -25,7 +25,9 @@ def our_rays(case: Case, scene: tracer.Scene, pixel: Array, sub_ray: Array) -> t
     with exact_arithmetic():
         canvas = DeviceCanvas.of(types, Canvas.of(scene.camera, scene.literal))
         n = types.opaque_id(scene.camera.supersample)
-        pixels = PixelGrid(column, row, types.UInt32(0), n, types.Bool(True))
+        pixels = PixelGrid(
+            types.UInt32(0), types.UInt32(1), column, row, types.UInt32(0), n, types.Bool(True)
+        )
         o, d = primary_ray(types, canvas, pixels, number)
         return o.numpy().T.astype(np.float64), d.numpy().T.astype(np.float64)
 

@@ -8,6 +8,7 @@ from typing import Any
 import drjit as dr
 
 from tracer.acceleration.departure import Departure, doubtful, may_be_doubtful, meet_near_origin
+from tracer.acceleration.layout import NodeLists
 from tracer.acceleration.slabs import Slabs
 from tracer.acceleration.triangle import (
     Triangle,
@@ -107,6 +108,25 @@ def visit_triangles(
         label="root",
     )
     return state
+
+
+def distance_to(backend: Backend, lists: NodeLists, ray: Ray, triangle: Triangle) -> Any:
+    """Distance (n,) of a triangle that a ray is known to meet, and that it does not leave: to the last bit
+    what `visit_triangles` finds."""
+    found = meet_triangle(backend.epsilon, triangle, ray, projection_axes(ray.d))
+
+    def with_care(t: Any) -> tuple[Any]:
+        slabs = Slabs.of(backend, lists, ray)
+        return (_in_own_box(slabs, ray, triangle, t, True)[0],)
+
+    (t,) = dr.if_stmt(
+        args=(found.t,),
+        cond=dr.abs(found.speed) < GRAZING,
+        true_fn=with_care,
+        false_fn=lambda t: (t,),
+        label="grazing",
+    )
+    return t
 
 
 def _height_of(light: Any, test: TriangleTest) -> Any:

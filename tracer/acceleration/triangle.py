@@ -11,19 +11,21 @@ made in double precision.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any
 
 import drjit as dr
+import numpy as np
 
 from tracer.acceleration.layout import NodeLists
 from tracer.backends import Backend
 from tracer.ray import Ray, max_abs, select_max, select_min
+from tracer.replay import NOT_IN_KERNELS
 
 TRIANGLE_WORDS = 16
 """Floats of a triangle in its table: three corners, unit normal (zero: degenerate, never hit), two halves of
-its primitive id (whole numbers below 2^16, exact in single precision), 2 unused."""
+its primitive id (whole numbers below 2^16, exact in single precision), the longest edge, 1 unused."""
 
 CONTACT_SLACK = 32
 """Bound on the error of a hit point, in units of eps S: 8 across its surface, and up to 4 times that along it
@@ -34,20 +36,24 @@ decided by geometry."""
 @dataclass
 class TriangleTables:
     """All triangles of a scene in Dr.Jit memory: `rows` of `TRIANGLE_WORDS` words each, in the order of the
-    leaves, and the hierarchy over them."""
+    leaves, and the hierarchy over them. On the host: the `middle` (3,) of all, and the median length of their
+    longest edges, `typical_edge`."""
 
     rows: Any
     lists: NodeLists
+    middle: np.ndarray = field(metadata=NOT_IN_KERNELS)
+    typical_edge: float = field(metadata=NOT_IN_KERNELS)
 
 
 @dataclass
 class Triangle:
-    """n triangles: corners and unit geometric normal, each (3, n)."""
+    """n triangles: corners and unit geometric normal, each (3, n); length of the longest `edge` (n,)."""
 
     v0: Any
     v1: Any
     v2: Any
     normal: Any
+    edge: Any
 
 
 @dataclass
@@ -69,7 +75,11 @@ def fetch_triangle(backend: Backend, table: Any, slot: Any) -> tuple[Triangle, A
     a, b = (dr.gather(backend.FloatN, table, slot * 2 + k, shape=(8, dr.width(slot))) for k in range(2))
     vector = backend.Vector3
     triangle = Triangle(
-        vector(a[0], a[1], a[2]), vector(a[3], a[4], a[5]), vector(a[6], a[7], b[0]), vector(b[1], b[2], b[3])
+        vector(a[0], a[1], a[2]),
+        vector(a[3], a[4], a[5]),
+        vector(a[6], a[7], b[0]),
+        vector(b[1], b[2], b[3]),
+        b[6],
     )
     return triangle, (backend.UInt32(b[4]) << 16) | backend.UInt32(b[5])
 

@@ -2,7 +2,7 @@
 
 The nodes stand in a list for every octant of directions (`layout.py`). A lane goes on to the next node where
 it meets a box, and jumps where it misses one. Nodes and leaves take turns: lanes without anything to test
-take `STRIDE` steps through the list, then all lanes that have something test one thing. So no lane waits
+take a few steps through the list, then all lanes that have something test one thing. So no lane waits
 until its neighbors are done with a long leaf (measured: a third faster for incoherent rays than one inner
 loop for each).
 """
@@ -19,7 +19,8 @@ from tracer.acceleration.layout import FLOAT_WORDS, LEAF, NodeLists
 from tracer.backends import Backend
 
 STRIDE = 2
-"""Steps between two tests. 3 are as fast for incoherent rays, slower for shadow rays, which end at a hit."""
+"""Steps between two tests, for rays. 3 are as fast for incoherent ones, slower for shadow rays, which end at
+a hit."""
 
 
 @dataclass
@@ -61,11 +62,12 @@ def walk(
     test: Callable[[Any, Any], Any],
     state: Any,
     done: Callable[[Any], Any] | None = None,
+    stride: int = STRIDE,
 ) -> Any:
     """Folds what lies in the leaves on the way into a state.
 
     `crosses(node, state)`: mask, goes into the node; `test(slot, state)`: the next state; `done(state)`:
-    mask, ends the walk.
+    mask, ends the walk; `stride`: steps between two tests.
     """
     begin = octant * lists.count
     end = begin + lists.count
@@ -83,7 +85,7 @@ def walk(
         return leaf + 7, test((leaf & (LEAF - 1)) >> 3, state)
 
     def body(node: Any, leaf: Any, state: Any) -> tuple[Any, Any, Any]:
-        for _ in range(STRIDE):
+        for _ in range(stride):
             node, leaf = step(node, leaf, state)
         leaf, state = dr.if_stmt(
             args=(leaf, state),

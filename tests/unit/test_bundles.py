@@ -1,0 +1,198 @@
+"""Bundles of primary rays: what they call certain a single ray finds, and no picture depends on them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+import numpy as np
+import pytest
+
+import tracer
+from tests.accuracy import worlds
+from tests.accuracy.worlds import icosphere
+from tests.unit.test_hierarchy import pile, scene_of, single, slivers, soup
+from tracer import first_hits
+from tracer.acceleration import bundles
+from tracer.acceleration.bundles import DOUBTFUL, RAYS, Bundles, nearest_of_bundles
+from tracer.backends import Backend, exact_arithmetic, find_backend
+from tracer.camera import Camera
+from tracer.canvas import Canvas, DeviceCanvas
+from tracer.device_scene import DeviceScene, compile_scene
+from tracer.intersection import closest_triangle, free_ray
+
+Array = np.ndarray
+PIXELS = 64
+
+
+def heights() -> Array:
+    """A smooth hill over a grid: triangles that share edges along rows of pixels."""
+    x, y = np.meshgrid(np.linspace(-1, 1, 17), np.linspace(-1, 1, 17))
+    p = np.stack([x, y, 0.3 * np.exp(-3 * (x * x + y * y))], axis=-1)
+    a, b, c, d = p[:-1, :-1], p[:-1, 1:], p[1:, 1:], p[1:, :-1]
+    return single(np.concatenate([np.stack(t, axis=2).reshape(-1, 3, 3) for t in ((a, b, c), (a, c, d))]))
+
+
+def shells() -> Array:
+    """A sphere within a sphere that is larger by less than rounding shows, and one by a little more."""
+    vertices, faces = icosphere(2)
+    return single(np.concatenate([vertices[faces] * size for size in (1, 1 + 2e-7, 1 + 1e-5)]))
+
+
+SOUPS: dict[str, Callable[[], Array]] = {
+    "soup": lambda: soup(6, 300, 1.0),
+    "fine soup": lambda: soup(7, 4000, 0.1),
+    "slivers": lambda: slivers(8, 200),
+    "walls": lambda: pile(9),
+    "hill": heights,
+    "shells": shells,
+    "far": lambda: single(soup(10, 300, 1.0) + 300),
+    "huge": lambda: single(soup(11, 300, 1.0) * 1e15),
+    "one": lambda: soup(12, 1, 1.0),
+}
+
+
+def cameras(corners: Array) -> list[Canvas]:
+    """From outside, from inside, in the plane of a triangle, along an axis, and straight onto an edge."""
+    rng = np.random.default_rng(4)
+    middle, size = corners.mean(axis=(0, 1)), float(np.ptp(corners, axis=(0, 1)).max())
+    corner, edge = corners[0, 0], corners[0, 1] - corners[0, 0]
+    toward = rng.normal(size=(3, 3))
+    toward *= 2 * size / np.linalg.norm(toward, axis=1)[:, None]
+    eyes = [middle + toward[0], middle + toward[1], middle, corner - 2 * edge, middle + [0, 0, 2 * size]]
+    targets = [middle, corner, middle + toward[2], corner + edge, middle]
+    return [
+        Canvas.of(
+            Camera(
+                origin=tuple(eye),
+                target=tuple(target),
+                up=(0.3, 1.0, 0.1) if k < 4 else (0.0, 1.0, 0.0),
+                fov=50.0,
+                distance=size * [0.01, 1.5, 0.01, 0.01, 1.0][k],
+                resolution=(PIXELS, PIXELS),
+            )
+        )
+        for k, (eye, target) in enumerate(zip(eyes, targets, strict=True))
+    ]
+
+
+def picture_rays(backend: Backend, canvas: Canvas) -> tuple[DeviceCanvas, Callable[[Any], tuple[Any, Any]]]:
+    """The rays of a picture by number: blocks of 4 x 4 pixels, row by row within each."""
+    device = DeviceCanvas.of(backend, canvas)
+
+    def ray_of(number: Any) -> tuple[Any, Any]:
+        block, place = number >> 4, number & 15
+        across = PIXELS // 4
+        column = (block & (across - 1)) * 4 + (place & 3)
+        row = (block >> 4) * 4 + (place >> 2)
+        return device.ray(backend.Float(column) + device.offset, backend.Float(row) + device.offset)
+
+    assert PIXELS // 4 == 16
+    return device, ray_of
+
+
+def both_ways(device: DeviceScene, canvas: Canvas) -> tuple[Array, Array]:
+    """Primitives by bundles, and ray by ray."""
+    backend = device.backend
+    assert device.triangles is not None
+    with exact_arithmetic():
+        on_device, ray_of = picture_rays(backend, canvas)
+        bundle = dr.arange(backend.UInt32, PIXELS**2 // RAYS)
+        rays = [ray_of(bundle * RAYS + k) for k in range(RAYS)]
+        starts = [dr.sqrt(dr.squared_norm(o - on_device.eye)) for o, _ in rays]
+        found = nearest_of_bundles(
+            backend, device.triangles, Bundles(on_device.eye, [d for _, d in rays], starts)
+        )
+        dr.eval(found)
+        o, d = ray_of(dr.arange(backend.UInt32, PIXELS**2))
+        singly = closest_triangle(device, free_ray(device, o, d), dr.full(backend.Bool, True, PIXELS**2))
+        return np.stack([p.numpy() for p in found], axis=1).ravel(), singly.primitive.numpy()
+
+
+def compare(name: str, precision: str) -> None:
+    corners = SOUPS[name]()
+    device = compile_scene(scene_of(corners), find_backend("llvm", precision))
+    for number, canvas in enumerate(cameras(corners)):
+        found, singly = both_ways(device, canvas)
+        wrong = (found != DOUBTFUL) & (found != singly)
+        assert not wrong.any(), f"camera {number}: {int(wrong.sum())} of {wrong.size}"
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+@pytest.mark.parametrize("name", SOUPS)
+def test_what_bundles_call_certain_is_what_single_rays_find(name: str, precision: str) -> None:
+    compare(name, precision)
+
+
+def test_too_little_doubt_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bundles, "ROUNDING", 0.0)
+    with pytest.raises(AssertionError):
+        for name in SOUPS:
+            compare(name, "single")
+
+
+@pytest.mark.parametrize(("precision", "most"), [("single", 0.02), ("double", 0.001)])
+def test_few_rays_are_doubtful(precision: str, most: float) -> None:
+    """Of bundles whose directions have one sign on each axis: nothing is known of the others."""
+    vertices, faces = icosphere(1)
+    corners = single(vertices[faces])
+    device = compile_scene(scene_of(corners), find_backend("llvm", precision))
+    canvas = cameras(corners)[0]
+    found, singly = both_ways(device, canvas)
+    _, ray_of = picture_rays(device.backend, canvas)
+    d = np.sign(ray_of(dr.arange(device.backend.UInt32, PIXELS**2))[1].numpy()).reshape(3, -1, RAYS)
+    one_sign = np.repeat((d == d[..., :1]).all(axis=(0, 2)), RAYS)
+    assert one_sign.mean() > 0.7
+    assert (singly[one_sign] < len(corners)).mean() > 0.2
+    assert (found[one_sign] == DOUBTFUL).mean() < most
+
+
+def test_bundles_that_meet_too_many_triangles_are_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bundles, "MOST_TRIANGLES", 2)
+    corners = SOUPS["fine soup"]()
+    device = compile_scene(scene_of(corners), find_backend("llvm"))
+    found, singly = both_ways(device, cameras(corners)[0])
+    assert (found == DOUBTFUL).mean() > 0.3
+    assert ((found == DOUBTFUL) | (found == singly)).all()
+
+
+# ---- Pictures ----------------------------------------------------------------------------------------------
+
+
+def picture(scene: tracer.Scene, patch: pytest.MonkeyPatch, bundled: bool, **settings: Any) -> Any:
+    patch.setattr(first_hits, "FEWEST_RAYS", 0 if bundled else 1 << 40)
+    patch.setattr(first_hits, "SMALLEST_EDGE", 0.0)
+    return tracer.render(scene, **settings)
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+@pytest.mark.parametrize("name", ["flat meshes", "smooth glass", "ugly mesh"])
+def test_no_picture_depends_on_bundles(
+    name: str, precision: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    scene = tracer.load(worlds.FEATURES[name](), base_dir=worlds.write_files(tmp_path))
+    for settings in ({}, {"supersample": 3, "crop": (5, 3, 30, 21), "aovs": "all"}):
+        ones, others = (
+            picture(scene, monkeypatch, bundled, precision=precision, **settings) for bundled in (True, False)
+        )
+        assert ones.color.tobytes() == others.color.tobytes()
+        assert ones.depth.tobytes() == others.depth.tobytes()
+        assert all(ones.aovs[k].tobytes() == others.aovs[k].tobytes() for k in ones.aovs)
+        assert ones.stats["rays"] == others.stats["rays"]
+
+
+def test_bundles_are_used_where_they_pay(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Many rays, and triangles that are not much smaller than pixels."""
+    asked = []
+    bundled = first_hits.bundled
+    monkeypatch.setattr(first_hits, "bundled", lambda *a: asked.append(1) or bundled(*a))
+    scene = tracer.load(worlds.FEATURES["flat meshes"](), base_dir=worlds.write_files(tmp_path))
+    tracer.render(scene, resolution=(512, 512))
+    assert len(asked) == 1
+    tracer.render(scene, resolution=(64, 64))
+    assert len(asked) == 1
+    monkeypatch.setattr(first_hits, "SMALLEST_EDGE", 1e9)
+    tracer.render(scene, resolution=(512, 512))
+    assert len(asked) == 1
