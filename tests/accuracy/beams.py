@@ -281,7 +281,7 @@ def check_lone(precision: str, n: int, points: int, seed: int = 1) -> Array:
         p = vectors(backend, lone.p)
         lone.p = p.numpy().T.astype(np.float64)
         a, b, c = (vectors(backend, lone.corners[:, k]) for k in range(3))
-        triangle = Triangle(a, b, c, vectors(backend, normals))
+        triangle = Triangle(a, b, c, vectors(backend, normals), edge=None)
         up = vectors(backend, unit(lone.c - lone.p))
         held = lone.radius + CONTACT_REACH * backend.epsilon * (np.abs(lone.c).max(axis=1) + lone.radius)
         shaft = Shaft.of(backend, p, Ball(vectors(backend, lone.c), numbers(backend, held)))
