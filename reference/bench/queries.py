@@ -118,7 +118,7 @@ def closest_of_neighbors(device: Any, o: Any, d: Any, eye: Any, active: Any) -> 
     backend = device.backend
 
     def ray_of(number: Any) -> tuple[Any, Any]:
-        return dr.gather(backend.Vector3, o, number), dr.gather(backend.Vector3, d, number)
+        return eye + dr.zeros(backend.Vector3, dr.width(number)), dr.gather(backend.Vector3, d, number)
 
     first = nearest_of_neighbors(backend, device.triangles, eye, dr.width(d), ray_of)
     numbers = doubtful_rays(first)

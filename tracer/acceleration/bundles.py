@@ -75,8 +75,8 @@ def nearest_of_neighbors(
     bundles = Bundles(eye, [d for _, d in rays], [dr.sqrt(dr.squared_norm(o - eye)) for o, _ in rays])
     result = dr.empty(backend.UInt32, count)
     found = nearest_of_bundles(backend, tables, bundles)
-    for k in range(0, RAYS, 8):  # packets have 8 words at most
-        dr.scatter(result, backend.IdN(found[k : k + 8]), bundle * (RAYS // 8) + k // 8)
+    for k in range(RAYS):  # in any other mode each starts a kernel of its own, with all of the walk
+        dr.scatter(result, found[k], bundle * RAYS + k, mode=dr.ReduceMode.Permute)
     return result
 
 
