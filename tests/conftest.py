@@ -48,7 +48,7 @@ def _drjit_state() -> Iterator[None]:
 
 
 def pytest_configure() -> None:
-    """Code that a test changes is never answered for by what was recorded before."""
+    """Code that a test changes is never answered for by what was made or recorded before."""
     for name in ("setattr", "delattr", "setitem", "delitem", "undo"):
         setattr(pytest.MonkeyPatch, name, _and_forget(getattr(pytest.MonkeyPatch, name)))
 
@@ -57,8 +57,9 @@ def _and_forget(change: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(change)
     def changed(*arguments: Any, **keywords: Any) -> Any:
         result = change(*arguments, **keywords)
-        if "tracer.replay" in sys.modules:
-            sys.modules["tracer.replay"].forget_recordings()
+        for module, forget in (("tracer.replay", "forget_recordings"), ("tracer.cache", "forget_everything")):
+            if module in sys.modules:
+                getattr(sys.modules[module], forget)()
         return result
 
     return changed

@@ -11,7 +11,9 @@ from tracer.acceleration.build import build_hierarchy
 from tracer.acceleration.layout import threaded
 from tracer.acceleration.triangle import CONTACT_SLACK, TRIANGLE_WORDS, TriangleTables
 from tracer.backends import INVALID, Backend
+from tracer.cache import Cache
 from tracer.errors import SceneError
+from tracer.placement import Placement
 from tracer.scene import Scene
 from tracer.shafts import Ball, Enclosure, ball_around
 from tracer.shapes import Instance, Mesh, ShapeRecord
@@ -45,21 +47,30 @@ class MeshTables:
     slot_of: Any = None
 
 
+_PLACED: Cache[PlacedMesh] = Cache(entries=1024, megabytes=256)
+_TABLES: Cache[MeshTables] = Cache(entries=4, megabytes=512)
+
+
 def compile_meshes(
     scene: Scene, backend: Backend, meshes: dict[int, PlacedMesh], first: np.ndarray
 ) -> MeshTables:
     """The tables of placed meshes by shape; `first` (shapes + 1,): the first primitive of each shape."""
     if not meshes:
         return MeshTables()
-    counts = np.diff(first)
-    triangles, slots = _triangle_tables(backend, meshes, first)
-    return MeshTables(
-        triangles=triangles,
-        enclosures=_enclosures(backend, meshes),
-        smooth=_smooth_tables(scene, backend, meshes, slots),
-        shape_of=backend.id_table(np.repeat(np.arange(len(counts)), counts)),
-        slot_of=backend.id_table(_slot_of_primitive(counts, meshes, slots)),
-    )
+    smooth = [i in meshes and bool(inherited(scene, shape, "smooth")) for i, shape in enumerate(scene.shapes)]
+
+    def make() -> MeshTables:
+        counts = np.diff(first)
+        triangles, slots = _triangle_tables(backend, meshes, first)
+        return MeshTables(
+            triangles=triangles,
+            enclosures=_enclosures(backend, meshes),
+            smooth=_smooth_tables(backend, meshes, slots, smooth),
+            shape_of=backend.id_table(np.repeat(np.arange(len(counts)), counts)),
+            slot_of=backend.id_table(_slot_of_primitive(counts, meshes, slots)),
+        )
+
+    return _TABLES.get((backend, *meshes.items(), *first.tolist(), *smooth), make)
 
 
 def source_of(scene: Scene, shape: ShapeRecord) -> ShapeRecord:
@@ -78,7 +89,7 @@ def inherited(scene: Scene, shape: ShapeRecord, key: str) -> Any:
 def placed_meshes(scene: Scene) -> dict[int, PlacedMesh]:
     """Triangles of every mesh and instance, by shape; each file is read once."""
     read: dict[int, MeshData] = {}
-    placed = {}
+    placed: dict[int, PlacedMesh] = {}
     for i, shape in enumerate(scene.shapes):
         mesh = source_of(scene, shape)
         if not isinstance(mesh, Mesh):
@@ -86,10 +97,21 @@ def placed_meshes(scene: Scene) -> dict[int, PlacedMesh]:
         if id(mesh) not in read:
             path = None if mesh.file is None else scene.resolve(mesh.file)
             read[id(mesh)] = read_mesh(mesh, path, f"{scene.name}: shapes.{mesh.name or i}")
-        placed[i] = place_mesh(read[id(mesh)], shape.placement)
-        if not np.isfinite(placed[i].corners).all():
-            raise SceneError(f"{scene.name}: shapes.{shape.name or i} leaves the range of single precision")
+        placed[i] = _placed(read[id(mesh)], shape.placement, f"{scene.name}: shapes.{shape.name or i}")
     return placed
+
+
+def _placed(data: MeshData, placement: Placement, where: str) -> PlacedMesh:
+    """The mesh in world space, placed only once; `where` names the shape in error texts."""
+
+    def make() -> PlacedMesh:
+        placed = place_mesh(data, placement)
+        if not np.isfinite(placed.corners).all():
+            raise SceneError(f"{where} leaves the range of single precision")
+        return placed
+
+    numbers = placement.rotation, placement.scale, placement.shift
+    return _PLACED.get((data, placement.is_identity, *(x.tobytes() for x in numbers)), make)
 
 
 def _triangle_tables(
@@ -163,9 +185,8 @@ def _slot_of_primitive(counts: np.ndarray, meshes: dict[int, PlacedMesh], slots:
 
 
 def _smooth_tables(
-    scene: Scene, backend: Backend, meshes: dict[int, PlacedMesh], slots: np.ndarray
+    backend: Backend, meshes: dict[int, PlacedMesh], slots: np.ndarray, wanted: list[bool]
 ) -> SmoothTables | None:
-    wanted = [i in meshes and bool(inherited(scene, shape, "smooth")) for i, shape in enumerate(scene.shapes)]
     if not any(wanted):
         return None
     kept = slots >= 0

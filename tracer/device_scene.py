@@ -6,7 +6,9 @@ in memory, so moving a sphere or changing a color compiles nothing new.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,8 +16,10 @@ import numpy as np
 from tracer.acceleration.triangle import TriangleTables
 from tracer.backends import INVALID, Backend
 from tracer.color import decode_srgb
-from tracer.device_meshes import SmoothTables, compile_meshes, inherited, placed_meshes, source_of
+from tracer.device_meshes import SmoothTables, compile_meshes, inherited, placed_meshes
+from tracer.device_textures import compile_textures
 from tracer.errors import SceneError
+from tracer.last_scenes import LastScenes
 from tracer.light_tables import LightTables, compile_lights
 from tracer.material import Material
 from tracer.ray import SIDE_BITS
@@ -25,9 +29,7 @@ from tracer.shafts import Enclosure
 from tracer.shapes import Plane, ShapeRecord, Sphere
 from tracer.shapes.sphere_table import SphereTable
 from tracer.shapes.triangles import PlacedMesh
-from tracer.textures import Solid
-from tracer.textures.picture import read_picture
-from tracer.textures.tables import PackedTexture, TexturePacker, TextureTables
+from tracer.textures.tables import PackedTexture, TextureTables
 
 PLANE, SPHERE, MESH = range(3)
 
@@ -102,9 +104,21 @@ class DeviceScene:
     host: HostScene = field(metadata=NOT_IN_KERNELS)
 
 
+_LAST: LastScenes[DeviceScene] = LastScenes(variants=2, megabytes=256)
+
+
 def compile_scene(scene: Scene, backend: Backend) -> DeviceScene:
-    """The tables of a scene; raises `SceneError` for files that cannot be used."""
-    scene.check()
+    """The tables of a scene, those of the last time where nothing but the camera has changed; raises
+    `SceneError` for files that cannot be used."""
+
+    def make() -> tuple[DeviceScene, Iterator[Path]]:
+        device = _compiled(scene, backend)
+        return device, (file for mesh in device.host.meshes.values() for file in mesh.data.files)
+
+    return _LAST.get(scene, backend, make)
+
+
+def _compiled(scene: Scene, backend: Backend) -> DeviceScene:
     meshes = placed_meshes(scene)
     counts = [len(meshes[i].corners) if i in meshes else 1 for i in range(len(scene.shapes))]
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
@@ -115,8 +129,7 @@ def compile_scene(scene: Scene, backend: Backend) -> DeviceScene:
     decode = decode_srgb if scene.color_space == "linear" else np.asarray
     slots, sphere_table, planes = _analytic_shapes(scene, backend, rows, first)
     tables = compile_meshes(scene, backend, meshes, first)
-    packer = TexturePacker(scene.literal, decode, lambda file: read_picture(scene.resolve(file)))
-    textures = _textures(scene, packer)
+    textures = compile_textures(scene, backend)
     return DeviceScene(
         backend=backend,
         options=Options(
@@ -134,11 +147,11 @@ def compile_scene(scene: Scene, backend: Backend) -> DeviceScene:
         shape_of=tables.shape_of,
         slot_of=tables.slot_of,
         geometry=backend.table(rows),
-        ids=backend.id_table(_id_rows(scene, textures)),
+        ids=backend.id_table(_id_rows(scene, textures.by_shape)),
         first_primitive=backend.id_table(first[:-1] if len(first) > 1 else [0]),
-        surfaces=backend.table(_surface_rows(scene, textures)),
+        surfaces=backend.table(_surface_rows(scene, textures.by_shape)),
         object_space=_object_space(scene, backend),
-        textures=packer.tables(backend, textures),
+        textures=textures.tables,
         lights=compile_lights(
             backend,
             scene.lights,
@@ -213,20 +226,6 @@ def _surface_rows(scene: Scene, textures: list[PackedTexture]) -> np.ndarray:
         rows[i, :4] = m.ior, m.reflection, m.refraction, m.absorption
         rows[i, 4:] = m.diffuse, m.specular, m.shininess, texture.rate
     return rows
-
-
-def _textures(scene: Scene, packer: TexturePacker) -> list[PackedTexture]:
-    """The texture of each shape; shapes that share one share its colors."""
-    packed: dict[Any, PackedTexture] = {}
-    result = []
-    for shape in scene.shapes:
-        has_own = shape.texture is not None or shape.color is not None
-        look = shape if has_own else source_of(scene, shape)
-        key = look.texture if look.texture is not None else look.color or (1.0, 1.0, 1.0)
-        if key not in packed:
-            packed[key] = packer.pack(scene.textures[key] if isinstance(key, str) else Solid(color=key))
-        result.append(packed[key])
-    return result
 
 
 def _object_space(scene: Scene, backend: Backend) -> Any:

@@ -7,6 +7,7 @@ import json
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import fields
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -24,6 +25,7 @@ from tracer.first_hits import first_triangles
 from tracer.pixels import BandPlace, pixels_of
 from tracer.replay import Program
 from tracer.scene import Scene
+from tracer.scene.contents import snapshot
 from tracer.settings import RAYS_PER_BAND, Settings, picture_canvas, picture_rectangle, with_seed
 from tracer.tiles import Band, Rectangle, bands, lane_count
 from tracer.version import __version__
@@ -169,7 +171,7 @@ class _Job:
             aovs=layers | {name: film.arrays[name] for name in self.layers if name in film.arrays},
             stats=self._stats(film),
             scene_name=scene.name,
-            scene_hash=scene_hash(scene),
+            hash_of=partial(scene_hash, snapshot(scene)),
             version=__version__,
             backend=self.backend.name,
             precision=self.backend.precision,

@@ -10,6 +10,8 @@ import pytest
 
 import tracer
 from tests.accuracy import worlds
+from tracer.cache import forget_everything
+from tracer.replay import forget_recordings
 
 
 def picture(table: dict[str, Any], **settings: Any) -> tracer.Result:
@@ -55,8 +57,10 @@ UPLOAD = 100
 
 
 def kernels_of(table: dict[str, Any], **settings: Any) -> list[dict[str, Any]]:
-    """The kernels that one render launches."""
+    """The kernels that one render launches where nothing is kept from those before."""
     scene = tracer.load(table)
+    forget_everything()
+    forget_recordings()
     dr.kernel_history_clear()
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         tracer.render(scene, **settings)

@@ -44,7 +44,7 @@ def result() -> Result:
         },
         stats={"seconds": 1.25},
         scene_name="room",
-        scene_hash="abc",
+        hash_of=lambda: "abc",
         version="0.1",
         backend="llvm",
         precision="single",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -27,12 +26,9 @@ def info(scene: str, overrides: tuple[str, ...], allow_outside: bool) -> None:
       tracer info my.toml --set camera.fov=30
     """
     from tracer.scene import find_scene, load
-    from tracer.shapes.triangles import files_read_once
 
     loaded = load(scene, allow_outside=allow_outside, overrides=overrides)
-    with files_read_once():
-        rows = describe(loaded, str(find_scene(scene)[0]))
-    for name, value in rows:
+    for name, value in describe(loaded, str(find_scene(scene)[0])):
         click.echo(f"{name:<12}{value}")
 
 
@@ -104,26 +100,15 @@ def _point(point: Any) -> str:
 def _memory(scene: Scene) -> str:
     """What the scene's tables take in single precision, counted on the compiled scene."""
     from tracer.backends import find_backend
+    from tracer.cache import bytes_of
     from tracer.device_scene import compile_scene
     from tracer.errors import MachineError
+    from tracer.replay import take_apart
 
     try:
         backend = find_backend()
     except MachineError as error:
         return f"unknown: {error}"
-    return f"{table_bytes(compile_scene(scene, backend)) / 2**20:.3g} MiB of tables in single precision"
-
-
-def table_bytes(record: Any) -> int:
-    """The bytes of all Dr.Jit arrays below a record."""
-    import drjit as dr
-
-    if is_dataclass(record) and not isinstance(record, type):
-        return sum(table_bytes(getattr(record, field.name)) for field in fields(record))
-    if isinstance(record, (list, tuple)):
-        return sum(table_bytes(entry) for entry in record)
-    if isinstance(record, type) or not dr.is_array_v(record):
-        return 0
-    if dr.depth_v(record) > 1:
-        return sum(table_bytes(entry) for entry in record)
-    return int(dr.width(record)) * int(dr.itemsize_v(record))
+    tables: list[Any] = []
+    take_apart(compile_scene(scene, backend), tables)
+    return f"{bytes_of(tables) / 2**20:.3g} MiB of tables in single precision"

@@ -20,7 +20,6 @@ from tracer.film.result import Result
 from tracer.render import RenderInterrupted, render
 from tracer.scene import Scene, load
 from tracer.scene_warnings import warnings_of
-from tracer.shapes.triangles import files_read_once
 
 
 @dataclass(frozen=True)
@@ -87,8 +86,7 @@ def render_scenes(
     worst = plan.worst
     for job in plan.jobs:
         try:
-            with files_read_once():
-                worst = max(worst, _Picture(job, wishes, interruption, imported).make())
+            worst = max(worst, _Picture(job, wishes, interruption, imported).make())
         except Exception as error:
             interruption.check()
             worst = max(worst, report(error))

@@ -11,6 +11,7 @@ import zipfile
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,7 @@ class Result:
     aovs: dict[str, NDArray] = field(default_factory=dict)  # (h, w) or (h, w, components) by name
     stats: dict[str, Any] = field(default_factory=dict)
     scene_name: str = ""
-    scene_hash: str = ""
+    hash_of: Callable[[], str] = str  # gives `scene_hash` when it is asked for
     version: str = ""
     backend: str = ""
     precision: str = ""
@@ -46,6 +47,11 @@ class Result:
     resolution: tuple[int, int] | None = None  # width, height of the full picture
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)  # display-referred
     color_space: str = "display"  # in which sub-rays were averaged: "display" or "linear"
+
+    @cached_property
+    def scene_hash(self) -> str:
+        """SHA-256 of the keys of the scene as it was rendered."""
+        return self.hash_of()
 
     def save(
         self, path: str | os.PathLike[str], bits: int = 8, alpha: bool = False, half: bool = False

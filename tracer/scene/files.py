@@ -53,13 +53,21 @@ def locate(file: str, base_dir: Path, allow_outside: bool, *, also: tuple[Path, 
 def place(file: str, base_dir: Path) -> Path:
     """The absolute path that `file` means, whether or not anything is there."""
     try:
-        path = (base_dir / file).resolve()
-        parts = PurePosixPath(file).parts
-        if parts[:1] == (ASSETS_PREFIX,) and not path.exists():
-            return ASSETS.joinpath(*parts[1:]).resolve()
+        for path in candidates(file, base_dir):
+            path = path.resolve()
+            if path.exists():
+                break
+        return path
     except (OSError, ValueError, RuntimeError):  # a null character, a name too long, a loop of links
         raise Refusal(f"is {show(file)}, which is no usable file name") from None
-    return path
+
+
+def candidates(file: str, base_dir: Path) -> Iterator[Path]:
+    """Where a file is looked for: below `base_dir`; then, by its name, below the assets folder."""
+    yield base_dir / file
+    parts = PurePosixPath(file).parts
+    if parts[:1] == (ASSETS_PREFIX,):
+        yield ASSETS.joinpath(*parts[1:])
 
 
 def moved(file: str, base_dir: Path, new_dir: Path) -> str:

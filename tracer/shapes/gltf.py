@@ -8,6 +8,7 @@ nodes in double precision. Materials, points and lines are skipped.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,8 @@ _HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "K
 def read_gltf(path: Path) -> PolygonSoup:
     """The triangles of a glTF or GLB file; `SceneError` says what is wrong with it."""
     try:
-        return _Reader(GltfFile(path)).soup()
+        file = GltfFile(path)
+        return replace(_Reader(file).soup(), other_files=tuple(file.other_files))
     except OSError as error:
         raise SceneError(f"{path}: cannot be read ({error.strerror})") from None
     except ValueError as error:

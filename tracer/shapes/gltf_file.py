@@ -30,6 +30,7 @@ class GltfFile:
         text, self._binary = _chunks(data) if data[:4] == b"glTF" else (data, None)
         self.tree = _parse(text)
         self._folder, self._buffers = path.parent, dict[int, bytes]()
+        self.other_files: list[Path] = []  # those read so far
         version = show(table(self.tree, "asset", "the file").get("version"))
         if not version.startswith('"2.'):
             raise ValueError(f"`asset.version` is {version}; allowed: 2.0")
@@ -124,8 +125,9 @@ class GltfFile:
         name = unquote(uri)
         if name.startswith("/") or ".." in PurePosixPath(name).parts or any(c in name for c in ":\\\0"):
             raise ValueError(f"`uri` of {what} is {show(uri)}; allowed: a file in the folder of this one")
+        self.other_files.append(self._folder / name)
         try:
-            return (self._folder / name).read_bytes()
+            return self.other_files[-1].read_bytes()
         except OSError as error:
             problem = f"is {show(uri)}, which cannot be read ({error.strerror})"
             raise ValueError(f"`uri` of {what} {problem}") from None

@@ -20,13 +20,14 @@ Polygons: TypeAlias = Sequence[Sequence[int]] | np.ndarray
 class PolygonSoup:
     """`vertices` (n, 3), `normals` (k, 3); `faces` and `face_normals`: for each face the numbers of its
     corners and of their normals (-1: none); `places` (n,), where the file does not number its vertices: the
-    first vertex at the place of each."""
+    first vertex at the place of each; `other_files`: what was read beside the file itself."""
 
     vertices: np.ndarray
     normals: np.ndarray
     faces: Polygons
     face_normals: Polygons
     places: np.ndarray | None = None
+    other_files: tuple[Path, ...] = ()
 
     @property
     def has_all_normals(self) -> bool:

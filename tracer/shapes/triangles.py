@@ -6,14 +6,14 @@ precision, every backend and Mitsuba see the same triangles.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
+from tracer.cache import Cache, FileCache, Identity
 from tracer.errors import SceneError
 from tracer.placement import Placement
 from tracer.shapes.areas import accurate_areas
@@ -37,14 +37,14 @@ BUILTIN_MESHES: dict[str, tuple[list[tuple[int, int, int]], list[tuple[int, ...]
 k."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MeshData:
     """A mesh before it is placed.
 
     `vertices` (n, 3) float32 values in float64; `triangles` (m, 3) vertex numbers; `faces` (m,) number of
     the face in the file that each triangle was cut from; `normals` (m, 3, 3) at the corners, of any length,
     from the file, or (0, 3, 3) unless it has one for every corner of every face; `places` (n,), where the
-    file does not number its vertices: the first vertex at the place of each.
+    file does not number its vertices: the first vertex at the place of each; `files`: all that were read.
     """
 
     vertices: np.ndarray
@@ -52,23 +52,42 @@ class MeshData:
     faces: np.ndarray
     normals: np.ndarray
     places: np.ndarray | None = None
+    files: tuple[Path, ...] = ()
 
 
-_READ: ContextVar[dict[Path, MeshData] | None] = ContextVar("_READ", default=None)
-"""What `files_read_once` has read so far."""
+_FILES: FileCache[MeshData] = FileCache(entries=32, megabytes=256)
+_LISTS: Cache[MeshData] = Cache(entries=32, megabytes=64)
+"""By the tuples of vertices and faces, which are parts of a record."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PlacedMesh:
-    """Triangles in world space. `corners` (m, 3, 3), unit `normals` (m, 3; zero: degenerate), `faces` (m,),
-    unit `corner_normals` (m, 3, 3) for smooth shading, `repeated` (m,): whether one before has the same
-    corners."""
+    """Triangles of `data` in world space. `corners` (m, 3, 3), unit `normals` (m, 3; zero: degenerate),
+    `repeated` (m,): whether one before has the same corners."""
 
+    data: MeshData
+    placement: Placement
     corners: np.ndarray
     normals: np.ndarray
-    faces: np.ndarray
-    corner_normals: np.ndarray
     repeated: np.ndarray
+
+    @property
+    def faces(self) -> np.ndarray:
+        """(m,) number of the face in the file that each triangle was cut from."""
+        return self.data.faces
+
+    @property
+    def corner_normals(self) -> np.ndarray:
+        """(m, 3, 3) unit normals for smooth shading: the file's, else area-weighted ones."""
+        data = self.data
+        if len(data.normals):
+            # Unit length first: a length from the file times a scale could leave the range of double
+            # precision.
+            normals = self.placement.normals(_unit(data.normals).reshape(-1, 3))
+            return _unit(normals.reshape(-1, 3, 3))
+        triangles = data.triangles if data.places is None else data.places[data.triangles]
+        areas = accurate_areas(self.corners)
+        return _unit(_area_weighted(triangles, areas, len(data.vertices)))[triangles]
 
     @property
     def degenerate(self) -> np.ndarray:
@@ -84,35 +103,30 @@ class PlacedMesh:
 
 
 def read_mesh(mesh: Mesh, path: Path | None, where: str) -> MeshData:
-    """The mesh that a record asks for; `path` is its resolved file, `where` names the shape in error
-    texts."""
+    """The mesh that a record asks for; `path` is its resolved file, `where` names the shape in error texts.
+    Read anew only where the file or the lists have changed."""
     if mesh.builtin is not None:
-        vertices, faces = BUILTIN_MESHES[mesh.builtin]
-        return _triangles(_plain_soup(vertices, faces), where)
+        return _builtin(mesh.builtin)
     if path is None:
-        assert mesh.vertices is not None and mesh.faces is not None
-        return _triangles(_plain_soup(mesh.vertices, mesh.faces), where)
-    read = _READ.get()
-    if read is not None and path in read:
-        return read[path]
+        vertices, faces = mesh.vertices, mesh.faces
+        assert vertices is not None and faces is not None
+        key = Identity(vertices), Identity(faces)
+        return _LISTS.get(key, lambda: _triangles(_plain_soup(vertices, faces), where))
+    return _FILES.get(path, lambda path: _read_file(path, where))
+
+
+@cache
+def _builtin(name: str) -> MeshData:
+    vertices, faces = BUILTIN_MESHES[name]
+    return _triangles(_plain_soup(vertices, faces), name)
+
+
+def _read_file(path: Path, where: str) -> tuple[MeshData, tuple[Path, ...]]:
     soup = read_polygons(path)
     if len(soup.faces) == 0:
         raise SceneError(f"{where}.file: {path} has no faces; allowed: a mesh with one triangle at least")
-    data = _triangles(soup, str(path))
-    if read is not None:
-        read[path] = data
-    return data
-
-
-@contextmanager
-def files_read_once() -> Iterator[None]:
-    """In this context a mesh file that is asked for again is not read again: a large one takes seconds, and a
-    command needs it for warnings and for the picture."""
-    token = _READ.set({})
-    try:
-        yield
-    finally:
-        _READ.reset(token)
+    data = replace(_triangles(soup, str(path)), files=(path, *soup.other_files))
+    return data, soup.other_files
 
 
 def place_mesh(data: MeshData, placement: Placement) -> PlacedMesh:
@@ -121,13 +135,7 @@ def place_mesh(data: MeshData, placement: Placement) -> PlacedMesh:
         vertices = placement.points(data.vertices).astype(np.float32).astype(np.float64)
         corners = vertices[data.triangles]
         areas = accurate_areas(corners)
-    if len(data.normals):
-        # Unit length first: a length from the file times a scale could leave the range of double precision.
-        corner_normals = _unit(placement.normals(_unit(data.normals).reshape(-1, 3)).reshape(-1, 3, 3))
-    else:
-        triangles = data.triangles if data.places is None else data.places[data.triangles]
-        corner_normals = _unit(_area_weighted(triangles, areas, len(vertices)))[triangles]
-    return PlacedMesh(corners, _unit(areas), data.faces, corner_normals, repeated(corners))
+    return PlacedMesh(data, placement, corners, _unit(areas), repeated(corners))
 
 
 def _area_weighted(triangles: np.ndarray, areas: np.ndarray, vertices: int) -> np.ndarray:
