@@ -50,13 +50,17 @@ class Frame:
 
 @dataclass(frozen=True)
 class Process:
-    """One peer in a process of its own, without a kernel cache: seconds of the first and of a later frame,
-    of the whole process with the first frame alone, and the most memory it held, in MiB."""
+    """One peer in processes of their own. Seconds: `first`, of the first frame with an empty kernel cache;
+    `warm`, of the first frame of a second process, which finds the kernels of the first; `later`, of another
+    frame; `process` and `warm_process`, from the start of both up to their first frame; NaN where there are
+    no kernels. `peak`: the most memory that the first one held, in MiB."""
 
     peer: str
     first: float
+    warm: float
     later: float
     process: float
+    warm_process: float
     peak: float
 
 

@@ -47,6 +47,11 @@ def test_a_scene_in_full(capsys: pytest.CaptureFixture[str]) -> None:
         assert point["frames"][1]["differing"] < 0.02
         assert all(len(frame["trace"]["seconds"]) == 2 for frame in point["frames"])
         assert all(process["peak"] > 10 for process in point["processes"])
+        for process in point["processes"]:
+            assert 0 < process["first"] <= process["process"]
+            compiles = process["peer"] != "povray"
+            assert (process["warm"] is not None) == (process["warm_process"] is not None) == compiles
+            assert not compiles or 0 < process["warm"] < min(process["first"], process["warm_process"])
     assert str(Path.cwd()) not in Path("out/index.html").read_text("utf-8")
 
 

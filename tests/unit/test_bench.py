@@ -20,6 +20,7 @@ from reference.bench.peers import Shot, hints
 from reference.bench.rays import NUDGE, primary, secondary
 from reference.bench.records import Benchmark, Build, Frame, Group, Point, Process, Rate, Series
 from reference.bench.report import page_of, summary_of, table_of
+from reference.bench.report.scaling import Scaling, scaling_of
 from reference.bench.report.units import duration, ratio
 from reference.bench.scenes import MESHES, SCENES, Workshop, lights, maker_of, mesh_alone, mirrors
 from reference.bench.session import Request, to_dict
@@ -171,6 +172,9 @@ def test_steps(tmp_path: Path) -> None:
 # ---- what is written ----
 
 
+NOTHING = float("nan")
+
+
 def series(*seconds: float) -> Series:
     return Series(seconds)
 
@@ -178,7 +182,10 @@ def series(*seconds: float) -> Series:
 def a_run() -> Benchmark:
     ours = Frame("tracer", series(0.1, 0.3, 0.2), series(0.4), {"primary": 64})
     theirs = Frame("mitsuba", series(0.25, 0.15), series(0.5), {"primary": 64}, 0.25)
-    processes = (Process("tracer", 1.0, 0.1, 2.0, 160.0), Process("povray", 1.0, float("nan"), 1.0, 30.0))
+    processes = (
+        Process("tracer", 1.0, 0.4, 0.1, 2.0, 0.9, 160.0),
+        Process("povray", 1.0, NOTHING, NOTHING, 1.0, NOTHING, 30.0),
+    )
     scenes = Group("scenes", "Scenes", "scene", (Point("room <&>", 0, 64, (ours, theirs), processes),))
     curve = (Point("1", 1, 64, (ours,)), Point("2", 2, 64, (ours, theirs)))
     rates = [
@@ -207,6 +214,28 @@ def test_the_page_is_one_file_with_all_numbers() -> None:
         assert part in text
     assert text.count("<svg") == 3
     assert "Nothing was compared" in page_of(Benchmark({}, (), (), ()))
+
+
+def test_the_cost_of_more_triangles() -> None:
+    """Said of meshes that are exactly so far apart, and of nothing else."""
+    kind = "primary, tile order"
+    seconds = {"3k": (1.0, 1.0), "82k": (2.0, 1.0), "330k": (2.5, 1.2), "1.3M": (3.0, 1.75)}
+    rates = tuple(
+        Rate(mesh, kind, peer, 100, 100, series(each[k]))
+        for mesh, each in seconds.items()
+        for k, peer in enumerate(("tracer", "mitsuba"))
+    )
+    full, short = (Benchmark({}, (), kept, ()) for kept in (rates, rates[:4]))
+    assert scaling_of(full) == [Scaling(kind, "82k", "1.3M", 1.5, 1.75)] and scaling_of(short) == []
+    title = "What 16 times the triangles cost a ray, from 82k to 1.3M"
+    for text in (page_of(full), summary_of(full), table_of(full)):
+        assert title in text and "1.50" in text and "1.75" in text
+    assert "times the cost of a primary ray for 16 times the triangles, to 1.3M (Embree: 1.75)" in summary_of(
+        full
+    )
+    assert not any("triangles cost" in write(short) for write in (page_of, summary_of, table_of))
+    ours = scaling_of(Benchmark({}, (), rates[2::2], ()))
+    assert ours[0].tracer == 1.5 and np.isnan(ours[0].embree)
 
 
 def test_the_summary_gives_ratios() -> None:

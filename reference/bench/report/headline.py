@@ -6,6 +6,10 @@ from math import isnan
 from typing import NamedTuple
 
 from reference.bench.records import PEERS, Benchmark
+from reference.bench.report.scaling import TIMES, scaling_of
+from reference.bench.report.units import ratio
+
+COHERENT = "primary, tile order"
 
 
 class Headline(NamedTuple):
@@ -16,7 +20,8 @@ class Headline(NamedTuple):
 
 
 def headline_of(benchmark: Benchmark) -> list[Headline]:
-    """Frames of scenes against the peers, and rays against Embree on the largest mesh that was measured."""
+    """Frames of scenes against the peers, rays against Embree on the largest mesh that was measured, and what
+    more triangles cost."""
     found = []
     scenes = next((group.points for group in benchmark.groups if group.name == "scenes"), ())
     for point in scenes[:2]:
@@ -24,10 +29,17 @@ def headline_of(benchmark: Benchmark) -> list[Headline]:
             if not isnan(point.ratio(peer)):
                 words = f"times as long as tracer takes {PEERS[peer]} for a frame of {point.name}"
                 found.append(Headline(point.ratio(peer), words))
-    for kind in ("primary, tile order", "shadow"):
+    for kind in (COHERENT, "shadow"):
         of = {rate.peer: rate for rate in benchmark.rates if rate.kind == kind}
         if {"tracer", "mitsuba"} <= set(of):
             value = of["tracer"].per_second / of["mitsuba"].per_second
             words = f"times Embree's rays a second: {kind}, mesh {of['tracer'].mesh}"
             found.append(Headline(value, words))
+    for each in scaling_of(benchmark):
+        if each.kind == COHERENT and not isnan(each.tracer):
+            beside = "" if isnan(each.embree) else f" (Embree: {ratio(each.embree)})"
+            words = (
+                f"times the cost of a primary ray for {TIMES} times the triangles, to {each.large}{beside}"
+            )
+            found.append(Headline(each.tracer, words))
     return found

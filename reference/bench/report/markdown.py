@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from reference.bench.rays import KINDS
 from reference.bench.records import PEERS, Benchmark, Group, Point
 from reference.bench.report.headline import headline_of
+from reference.bench.report.scaling import scaling_of, title_of
 from reference.bench.report.units import NOTHING, duration, mebibytes, million, ratio
 from reference.report.header import COMMAND
 
@@ -32,6 +33,10 @@ def summary_of(benchmark: Benchmark) -> str:
         lines += ["", "## The first picture, and memory", "", *_processes(benchmark)]
     if benchmark.rates:
         lines += ["", "## Million rays a second, by kind", "", *_rates(benchmark)]
+    scaling = scaling_of(benchmark)
+    if scaling:
+        costs = [(each.kind, f"{ratio(each.tracer)} ×", f"{ratio(each.embree)} ×") for each in scaling]
+        lines += ["", f"## {title_of(scaling[0])}", "", *_rows(("rays", "tracer", "Embree"), costs)]
     if benchmark.builds:
         lines += ["", "## From a file to a hierarchy", "", *_builds(benchmark)]
     if benchmark.notes:
@@ -63,7 +68,7 @@ def _processes(benchmark: Benchmark) -> Iterator[str]:
         (
             point.name,
             PEERS[each.peer],
-            *map(duration, (each.first, each.later, each.process)),
+            *map(duration, (each.first, each.warm, each.later, each.process, each.warm_process)),
             mebibytes(each.peak),
         )
         for group in benchmark.groups
@@ -71,7 +76,17 @@ def _processes(benchmark: Benchmark) -> Iterator[str]:
         for each in point.processes
     ]
     return _rows(
-        ("scene", "renderer", "first frame", "a later one", "process, one frame", "most memory"), rows
+        (
+            "scene",
+            "renderer",
+            "first frame ever",
+            "first, kernels cached",
+            "a later one",
+            "process, first ever",
+            "process, kernels cached",
+            "most memory",
+        ),
+        rows,
     )
 
 

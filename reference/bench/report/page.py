@@ -11,6 +11,7 @@ from reference.bench.records import PEERS, Benchmark, Group
 from reference.bench.report import units
 from reference.bench.report.headline import headline_of
 from reference.bench.report.plots import draw_curve, draw_rates, draw_ratios
+from reference.bench.report.scaling import scaling_of, title_of
 from reference.report import look, svg
 from reference.report.header import COMMAND
 
@@ -39,6 +40,8 @@ def page_of(benchmark: Benchmark) -> str:
         meshes=meshes,
         drawings=drawings,
         rates=rates,
+        scaling=scaling_of(benchmark),
+        title_of=title_of,
         css=look.css() + (TEMPLATES / "bench.css").read_text(encoding="utf-8"),
         script=look.script(),
     )

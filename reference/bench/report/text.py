@@ -6,6 +6,7 @@ from math import isnan
 
 from reference.bench.rays import KINDS
 from reference.bench.records import PEERS, Benchmark, Build, Point
+from reference.bench.report.scaling import Scaling, scaling_of, title_of
 from reference.bench.report.units import duration, million, ratio
 
 
@@ -17,6 +18,8 @@ def table_of(benchmark: Benchmark) -> str:
     meshes = dict.fromkeys(rate.mesh for rate in benchmark.rates)
     lines += ["Million rays a second"] if meshes else []
     lines += [f"  {_rate(benchmark, mesh, kind)}" for mesh in meshes for kind in KINDS]
+    scaling = scaling_of(benchmark)
+    lines += [title_of(scaling[0]), *(f"  {_cost(each)}" for each in scaling)] if scaling else []
     lines += ["From a file to a hierarchy"] if benchmark.builds else []
     return "\n".join([*lines, *(f"  {_build(each)}" for each in benchmark.builds)])
 
@@ -37,6 +40,10 @@ def _rate(benchmark: Benchmark, mesh: str, kind: str) -> str:
     if len(of) == 2:
         words.append(f"ratio {ratio(of['tracer'].per_second / of['mitsuba'].per_second)}")
     return f"{mesh:6} {kind:20} {', '.join(words)}"
+
+
+def _cost(each: Scaling) -> str:
+    return f"{each.kind:27} tracer {ratio(each.tracer)} times, Embree {ratio(each.embree)} times"
 
 
 def _build(each: Build) -> str:
