@@ -95,6 +95,17 @@ class Group:
     axis: str
     points: tuple[Point, ...]
 
+    @property
+    def peers(self) -> list[str]:
+        """Who rendered any of them, in the order of tables."""
+        return [peer for peer in PEERS if any(point.frame(peer) for point in self.points)]
+
+    @property
+    def kinds(self) -> list[str]:
+        """The kinds of rays that were counted."""
+        frames = [frame for point in self.points for frame in point.frames]
+        return list(dict.fromkeys(kind for frame in frames for kind in frame.rays))
+
 
 @dataclass(frozen=True)
 class Rate:

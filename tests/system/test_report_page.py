@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,26 +12,9 @@ from reference.report import write_report
 from tests.outcomes import COMMAND, failing_run
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, BrowserContext, Page, Route
+    from playwright.sync_api import Browser, BrowserContext, Page
 
 pytestmark = pytest.mark.slow
-
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """The system's browser; Playwright's own is never downloaded."""
-    from playwright.sync_api import sync_playwright
-
-    program = next((found for found in map(shutil.which, BROWSERS) if found), None)
-    if program is None:
-        pytest.skip(f"none of {', '.join(BROWSERS)} is on the path; scripts/install_browser.sh installs one")
-    with sync_playwright() as playwright:
-        # Its sandbox cannot start as root, as which tests run in containers.
-        opened = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        yield opened
-        opened.close()
 
 
 @pytest.fixture(scope="module")
@@ -42,27 +23,6 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("report") / "index.html"
     write_report(path, failing_run())
     return path
-
-
-@pytest.fixture
-def context(browser: Browser) -> Iterator[BrowserContext]:
-    """A window that says on closing whether the page asked for anything or complained."""
-    found = browser.new_context(viewport={"width": 1400, "height": 900}, color_scheme="light")
-    complaints: list[str] = []
-
-    def only_files(route: Route) -> None:
-        if route.request.url.startswith(("file:", "data:")):
-            route.continue_()
-        else:
-            complaints.append(f"asked for {route.request.url}")
-            route.abort()
-
-    found.route("**/*", only_files)
-    found.on("console", lambda message: complaints.append(f"{message.type}: {message.text}"))
-    found.on("weberror", lambda error: complaints.append(str(error.error)))
-    yield found
-    found.close()
-    assert not complaints
 
 
 @pytest.fixture

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from reference.bench.rays import KINDS
-from reference.bench.records import PEERS, Benchmark, Group, Point
+from reference.bench.records import PEERS, Benchmark, Group, Point, Rate
 from reference.bench.report.headline import headline_of
+from reference.bench.report.rates import rate_pairs
 from reference.bench.report.scaling import scaling_of, title_of
 from reference.bench.report.units import NOTHING, duration, mebibytes, million, ratio
 from reference.report.header import COMMAND
@@ -48,7 +48,7 @@ def summary_of(benchmark: Benchmark) -> str:
 
 
 def _table(group: Group) -> Iterator[str]:
-    names = [peer for peer in PEERS if any(point.frame(peer) for point in group.points)]
+    names = group.peers
     head = [group.axis, *(PEERS[peer] for peer in names)]
     head += [f"{PEERS[peer]} over tracer" for peer in names if peer != "tracer"]
     rows = []
@@ -91,14 +91,15 @@ def _processes(benchmark: Benchmark) -> Iterator[str]:
 
 
 def _rates(benchmark: Benchmark) -> Iterator[str]:
-    of = {(rate.mesh, rate.kind, rate.peer): rate.per_second for rate in benchmark.rates}
-    nothing = float("nan")
-    rows = []
-    for mesh in dict.fromkeys(rate.mesh for rate in benchmark.rates):
-        for kind in KINDS:
-            ours, theirs = (of.get((mesh, kind, peer), nothing) for peer in ("tracer", "mitsuba"))
-            rows.append((mesh, kind, million(ours), million(theirs), ratio(ours / theirs)))
+    rows = [
+        (pair.mesh, pair.kind, _million(pair.tracer), _million(pair.embree), ratio(pair.ratio))
+        for pair in rate_pairs(benchmark)
+    ]
     return _rows(("mesh", "rays", "tracer", "Embree", "tracer over Embree"), rows)
+
+
+def _million(rate: Rate | None) -> str:
+    return NOTHING if rate is None else million(rate.per_second)
 
 
 def _builds(benchmark: Benchmark) -> Iterator[str]:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
-from reference.bench.rays import KINDS
 from reference.bench.records import PEERS, Benchmark, Group
 from reference.bench.report import units
 from reference.bench.report.headline import headline_of
-from reference.bench.report.plots import draw_curve, draw_rates, draw_ratios
+from reference.bench.report.plots import draw_quotients, draw_rates, draw_ratios, draw_times
+from reference.bench.report.rates import rate_pairs
 from reference.bench.report.scaling import scaling_of, title_of
 from reference.report import look, svg
 from reference.report.header import COMMAND
@@ -23,12 +21,12 @@ def page_of(benchmark: Benchmark) -> str:
     environment = look.environment(TEMPLATES)
     for name in ("duration", "ratio", "million", "mebibytes"):
         environment.filters[name] = getattr(units, name)
-    meshes = list(dict.fromkeys(rate.mesh for rate in benchmark.rates))
+    pairs = rate_pairs(benchmark)
     with svg.style():
-        drawings = {group.name: _drawing(group) for group in benchmark.groups}
+        drawings = {group.name: _drawings(group) for group in benchmark.groups}
         rates = {
-            mesh: _svg(draw_rates(benchmark.rates, mesh), f"rates-{number}", f"Rays a second, mesh {mesh}")
-            for number, mesh in enumerate(meshes)
+            mesh: svg.svg_of(draw_rates(pairs, mesh), f"rates-{number}", f"Rays a second, mesh {mesh}")
+            for number, mesh in enumerate(dict.fromkeys(pair.mesh for pair in pairs))
         }
     return environment.get_template("bench.html.j2").render(
         benchmark=benchmark,
@@ -36,10 +34,9 @@ def page_of(benchmark: Benchmark) -> str:
         command=benchmark.header.get(COMMAND, ""),
         headline=headline_of(benchmark),
         peers=PEERS,
-        kinds=KINDS,
-        meshes=meshes,
         drawings=drawings,
         rates=rates,
+        pairs=pairs,
         scaling=scaling_of(benchmark),
         title_of=title_of,
         css=look.css() + (TEMPLATES / "bench.css").read_text(encoding="utf-8"),
@@ -47,10 +44,15 @@ def page_of(benchmark: Benchmark) -> str:
     )
 
 
-def _drawing(group: Group) -> str:
-    figure = draw_ratios(group) if group.name == "scenes" else draw_curve(group)
-    return _svg(figure, f"plot-{group.name}", group.title)
-
-
-def _svg(figure: Figure, name: str, description: str) -> str:
-    return svg.svg_of(figure, name, description)
+def _drawings(group: Group) -> list[str]:
+    """Bars of scenes, or two curves."""
+    if group.name == "scenes":
+        return [
+            svg.svg_of(draw_ratios(group, peer), f"plot-{peer}", f"{PEERS[peer]}, time over tracer&#39;s")
+            for peer in group.peers
+            if peer != "tracer"
+        ]
+    return [
+        svg.svg_of(draw_times(group), f"plot-{group.name}", f"{group.title}: time of a frame"),
+        svg.svg_of(draw_quotients(group), f"ratios-{group.name}", f"{group.title}: time over tracer&#39;s"),
+    ]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from math import isnan
 from typing import NamedTuple
 
 from reference.bench.rays import KINDS
-from reference.bench.records import Benchmark
+from reference.bench.records import Benchmark, Rate
+from reference.bench.report.rates import rate_pairs
 from reference.bench.scenes import MESHES
 
 TIMES = 16
@@ -26,19 +26,19 @@ class Scaling(NamedTuple):
 
 def scaling_of(benchmark: Benchmark) -> list[Scaling]:
     """Of every kind on the two largest meshes that are so far apart; none where no two are."""
-    rates = {(rate.mesh, rate.kind, rate.peer): rate.per_second for rate in benchmark.rates}
-    measured = [mesh for mesh in MESHES if any(rate.mesh == mesh for rate in benchmark.rates)]
-    pairs = [(a, b) for a in measured for b in measured if MESHES[b] ** 2 == TIMES * MESHES[a] ** 2]
-    if not pairs:
-        return []
-    small, large = pairs[-1]
+    measured = {(pair.mesh, pair.kind): pair for pair in rate_pairs(benchmark)}
+    sizes = {mesh: MESHES[mesh] ** 2 for mesh in MESHES if any(mesh == each for each, _ in measured)}
+    apart = [(a, b) for a in sizes for b in sizes if sizes[b] == TIMES * sizes[a]]
+    return [
+        Scaling(kind, small, large, _cost(before.tracer, after.tracer), _cost(before.embree, after.embree))
+        for small, large in apart[-1:]
+        for kind in KINDS
+        if (before := measured.get((small, kind))) and (after := measured.get((large, kind)))
+    ]
 
-    def cost(kind: str, peer: str) -> float:
-        before, after = (rates.get((mesh, kind, peer), float("nan")) for mesh in (small, large))
-        return before / after
 
-    found = [Scaling(kind, small, large, cost(kind, "tracer"), cost(kind, "mitsuba")) for kind in KINDS]
-    return [each for each in found if not (isnan(each.tracer) and isnan(each.embree))]
+def _cost(before: Rate | None, after: Rate | None) -> float:
+    return before.per_second / after.per_second if before and after else float("nan")
 
 
 def title_of(scaling: Scaling) -> str:

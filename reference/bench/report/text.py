@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import isnan
 
-from reference.bench.rays import KINDS
 from reference.bench.records import PEERS, Benchmark, Build, Point
+from reference.bench.report.rates import RatePair, rate_pairs
 from reference.bench.report.scaling import Scaling, scaling_of, title_of
 from reference.bench.report.units import duration, million, ratio
 
@@ -15,9 +15,8 @@ def table_of(benchmark: Benchmark) -> str:
     lines = []
     for group in benchmark.groups:
         lines += [group.title, *(f"  {_picture(point)}" for point in group.points)]
-    meshes = dict.fromkeys(rate.mesh for rate in benchmark.rates)
-    lines += ["Million rays a second"] if meshes else []
-    lines += [f"  {_rate(benchmark, mesh, kind)}" for mesh in meshes for kind in KINDS]
+    lines += ["Million rays a second"] if benchmark.rates else []
+    lines += [f"  {_rate(pair)}" for pair in rate_pairs(benchmark)]
     scaling = scaling_of(benchmark)
     lines += [title_of(scaling[0]), *(f"  {_cost(each)}" for each in scaling)] if scaling else []
     lines += ["From a file to a hierarchy"] if benchmark.builds else []
@@ -33,13 +32,12 @@ def _picture(point: Point) -> str:
     return f"{point.name:12} {', '.join(words)}"
 
 
-def _rate(benchmark: Benchmark, mesh: str, kind: str) -> str:
-    of = {rate.peer: rate for rate in benchmark.rates if (rate.mesh, rate.kind) == (mesh, kind)}
-    names = {"tracer": "tracer", "mitsuba": "Embree"}
-    words = [f"{names[peer]} {million(rate.per_second)}" for peer, rate in of.items()]
-    if len(of) == 2:
-        words.append(f"ratio {ratio(of['tracer'].per_second / of['mitsuba'].per_second)}")
-    return f"{mesh:6} {kind:20} {', '.join(words)}"
+def _rate(pair: RatePair) -> str:
+    sides = {"tracer": pair.tracer, "Embree": pair.embree}
+    words = [f"{name} {million(rate.per_second)}" for name, rate in sides.items() if rate is not None]
+    if not isnan(pair.ratio):
+        words.append(f"ratio {ratio(pair.ratio)}")
+    return f"{pair.mesh:6} {pair.kind:20} {', '.join(words)}"
 
 
 def _cost(each: Scaling) -> str:
