@@ -107,7 +107,8 @@ def _not_zero(direction: tuple[float, float, float]) -> tuple[float, float, floa
     return direction
 
 
-def _parse_color(value: Any) -> Any:
+def parse_color(value: Any) -> Any:
+    """The three channels of a color as text; lists are left to the checks of their numbers."""
     value = plain(value)
     if isinstance(value, str) and re.fullmatch(r"#([0-9a-fA-F]{3}|[0-9a-fA-F]{6})", value):
         digits = value[1:] if len(value) == 7 else "".join(2 * digit for digit in value[1:])
@@ -160,7 +161,7 @@ Vec4 = Annotated[tuple[Real, Real, Real, Real], PLAIN]
 Direction = Annotated[Vec3, AfterValidator(_not_zero)]
 Color = Annotated[
     tuple[Fraction, Fraction, Fraction],
-    BeforeValidator(_parse_color),
+    BeforeValidator(parse_color),
     PlainSerializer(color_to_toml, when_used="json"),
     WithJsonSchema(_COLOR_SCHEMA),
 ]

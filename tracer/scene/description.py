@@ -21,8 +21,10 @@ from tracer.lights import LIGHT_KINDS, LightRecord
 from tracer.material import Material
 from tracer.messages import Refusal, sentence
 from tracer.records import PLAIN, Color, Flag, Fraction, Name, Record, Seed, refuse_flag, union_of
+from tracer.scene.animation import Track
 from tracer.scene.checks import check_lights, check_one_shape, check_shapes
 from tracer.scene.files import locate, moved, records_with_files
+from tracer.scene.keyed import check_tracks, scene_at
 from tracer.shapes import SHAPE_KINDS, ShapeRecord
 from tracer.textures import TEXTURE_KINDS, TextureRecord
 from tracer.validation import validation_sentence
@@ -38,7 +40,7 @@ else:
 
 
 class Scene(Record):
-    """A whole scene: options, camera, lights, textures, materials and shapes.
+    """A whole scene: options, camera, lights, textures, materials, shapes and animation.
 
     Shape numbers in results are positions in `shapes`. Scenes are equal when all their keys are, wherever
     they come from.
@@ -84,6 +86,7 @@ class Scene(Record):
     textures: dict[Name, AnyTexture] = Field(default_factory=dict, description="textures by name")
     materials: dict[Name, Material] = Field(default_factory=dict, description="materials by name")
     shapes: list[AnyShape] = Field(default_factory=list, description="the shapes")
+    animation: list[Track] = Field(default_factory=list, description="numbers keyed over time")
 
     _name: str = PrivateAttr("scene")
     _label: str = PrivateAttr("scene")
@@ -178,7 +181,15 @@ class Scene(Record):
     def _cross_check(self) -> Self:
         check_lights(self.lights)
         check_shapes(self)
+        check_tracks(self)
         return self
+
+    def at(self, frame: float) -> Scene:
+        """The scene as `animation` has it at a frame, itself without animation; raises `SceneError`."""
+        try:
+            return scene_at(self, frame)
+        except Refusal as refusal:
+            raise SceneError(sentence(self._label, refusal.path, str(refusal))) from None
 
     # ---- saving ----
 
@@ -201,5 +212,5 @@ class Scene(Record):
         return self.__dict__ == other.__dict__ if isinstance(other, Scene) else NotImplemented
 
 
-_CONTAINERS = ("lights", "textures", "materials", "shapes")
+_CONTAINERS = ("lights", "textures", "materials", "shapes", "animation")
 _ENTRIES: dict[str, TypeAdapter[Any]] = {"lights": TypeAdapter(AnyLight), "shapes": TypeAdapter(AnyShape)}

@@ -1,8 +1,9 @@
 """How one scene tree is laid over another: `base`, `remove`, and keys that exclude each other.
 
-Tables merge key by key; an entry of `lights` or `shapes` whose `name` the base knows changes that entry,
-others are appended; every other list is replaced. A key drops the base's keys that it excludes (a `color` the
-base's `texture`, a look-at key the base's canvas); an entry of another `kind` replaces the base's entry.
+Tables merge key by key; an entry of `lights` or `shapes` whose `name` (of `animation`: whose `key`) the base
+knows changes that entry, others are appended; every other list is replaced. A key drops the base's keys that
+it excludes (a `color` the base's `texture`, a look-at key the base's canvas); an entry of another `kind`
+replaces the base's entry.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from tracer.messages import sentence, show, suggestion
 from tracer.records import Record
 
 NAMED_LISTS = ("lights", "shapes")
+_IDENTITIES = {"lights": "name", "shapes": "name", "animation": "key"}
+"""What tells that two entries of a list are the same one."""
 
 _RIVALS: dict[str, tuple[frozenset[str], ...]] = {
     "camera": (frozenset(CANVAS_KEYS), frozenset(LOOK_AT_KEYS)),
@@ -41,7 +44,7 @@ def plain_tree(value: Any) -> Any:
 def merged(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
     """The tree `over` laid over the tree `base`; `base` is changed and returned."""
     for key, value in over.items():
-        if key in NAMED_LISTS and _are_tables(value) and _are_tables(base.get(key)):
+        if key in _IDENTITIES and _are_tables(value) and _are_tables(base.get(key)):
             base[key] = _merged_entries(base[key], value, key)
         elif isinstance(value, dict) and isinstance(base.get(key), dict):
             base[key] = _merged_table(base[key], value, key)
@@ -92,9 +95,10 @@ def _changes_form(camera: dict[str, Any], side: frozenset[str]) -> bool:
 def _merged_entries(
     base: list[dict[str, Any]], over: list[dict[str, Any]], place: str
 ) -> list[dict[str, Any]]:
-    open_places = {entry["name"]: i for i, entry in enumerate(base) if isinstance(entry.get("name"), str)}
+    identity = _IDENTITIES[place]
+    open_places = {entry[identity]: i for i, entry in enumerate(base) if isinstance(entry.get(identity), str)}
     for entry in over:
-        name = entry.get("name")
+        name = entry.get(identity)
         number = open_places.pop(name, None) if isinstance(name, str) else None
         if number is None:
             base.append(entry)

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
 from tracer.errors import SceneError
-from tracer.messages import sentence, show, suggestion
+from tracer.messages import Refusal, sentence, show, suggestion
 from tracer.scene.description import Scene
 from tracer.scene.merging import NAMED_LISTS, drop_rivals
+from tracer.scene.paths import Part, Path, read_path
 from tracer.scene.toml_files import parse_value
 
-Part = str | int
-Path = tuple[Part, ...]
-
-_PART = re.compile(r"""\s*(?:("(?:[^"\\]|\\.)*")|'([^']*)'|([^\s."'=]+))\s*""")
 _TABLES_OF_NAMES = ("textures", "materials")
 
 
@@ -48,27 +43,10 @@ def _read_override(text: str) -> tuple[Path, Any]:
 
 
 def _read_path(text: str) -> tuple[Path, int]:
-    """The parts of a dotted path and where it ends; bare digits are a position, quoted ones a name."""
-    parts: list[Part] = []
-    place = 0
-    while match := _PART.match(text, place):
-        double, single, bare = match.groups()
-        place = match.end()
-        if bare is not None:
-            parts.append(int(bare) if bare.isdecimal() and len(bare) < 10 else bare)
-        else:
-            parts.append(_unquoted(double, text) if double is not None else single)
-        if text[place : place + 1] != ".":
-            return tuple(parts), place
-        place += 1
-    raise SceneError(f"--set {show(text)}: is no path; allowed: keys joined by dots, odd names in quotes")
-
-
-def _unquoted(quoted: str, text: str) -> str:
     try:
-        return str(json.loads(quoted))
-    except ValueError:
-        raise SceneError(f"--set {show(text)}: {quoted} is no quoted name") from None
+        return read_path(text)
+    except Refusal as refusal:
+        raise SceneError(f"--set {show(text)}: {refusal}") from None
 
 
 def _step(node: Any, part: Part, following: Part, walked: Path, label: str) -> Any:

@@ -46,6 +46,7 @@ def reference_page() -> str:
         for kind, record in kinds.items():
             definition = schema["$defs"][record.__name__]
             lines += _section(f'### {title}, kind = "{kind}"', definition, schema)
+    lines += _section("## `[[animation]]`", schema["$defs"]["Track"], schema)
     return "\n".join(lines)
 
 
