@@ -69,6 +69,8 @@ def measure(name: str, x: float, scene: tracer.Scene, terms: Terms, in_full: boo
         for run in runs:
             if run.peer != "povray":  # a new process each time, which nothing makes warm
                 run.runner.frame()
+                run.runner.remake()
+                run.runner.frame()
             terms.check()
         for round_ in range(terms.repeat):
             turn = round_ % len(runs)

@@ -36,9 +36,9 @@ class Series:
 class Frame:
     """One picture by one peer.
 
-    `trace`: from rays to colors; `whole`: what a user waits for (tracer: the call of `render`; Mitsuba: the
-    scene made anew, once, and a frame; POV-Ray: its process). `rays` by kind; `differing`: share of the
-    pixels that differ from tracer's by more than 2/255, NaN for tracer itself.
+    `trace`: from rays to colors; `whole`: what a user waits for (tracer: the scene made anew, once, and the
+    call of `render`; Mitsuba: the same with its frame; POV-Ray: its process). `rays` by kind; `differing`:
+    share of the pixels that differ from tracer's by more than 2/255, NaN for tracer itself.
     """
 
     peer: str

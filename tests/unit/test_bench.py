@@ -99,6 +99,9 @@ class _Fake:
     def __init__(self, name: str, seconds: float) -> None:
         self.name, self.seconds = name, seconds
 
+    def remake(self) -> None:
+        self.asked.append(f"{self.name}, made anew")
+
     def frame(self) -> Shot:
         self.asked.append(self.name)
         return Shot(np.full((2, 2, 3), 0.5 if self.name == "tracer" else 0.6), self.seconds, 2 * self.seconds)
@@ -115,12 +118,27 @@ def test_renderers_take_turns_and_stop_when_their_time_is_spent(monkeypatch: pyt
     scene = Scene(camera={"resolution": (2, 2)})  # type: ignore[arg-type]
     point = measure("a", 1.0, scene, terms)
     turns = ["tracer", "mitsuba", "povray", "mitsuba", "povray", "tracer", "povray", "tracer", "mitsuba"]
-    assert asked == ["tracer", "mitsuba", *turns]
+    warm = [word for peer in ("tracer", "mitsuba") for word in (peer, f"{peer}, made anew", peer)]
+    assert asked == [*warm, *turns]
     assert point.ratio("mitsuba") == 2 and point.ratio("povray", least=True) == 30
     assert point.frames[1].differing == 1 and point.frames[0].differing != point.frames[0].differing
     asked.clear()
     spent = measure("a", 1.0, scene, replace(terms, budget=0.0))
     assert [len(frame.trace.seconds) for frame in spent.frames] == [1, 1, 1]
+
+
+def test_all_that_a_user_waits_for_has_the_scene_made_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Though tracer keeps what it made: reading the file and building the hierarchy count."""
+    runner = peers.TracerRunner(SCENES["room-3k"](Workshop(tmp_path), 16))
+    forgets: list[bool] = []
+    monkeypatch.setattr(peers, "forget_everything", lambda: forgets.append(True))
+    before = runner.frame()
+    runner.remake()
+    shot = runner.frame()
+    assert forgets == [True]
+    assert before.whole > before.trace and shot.whole > shot.trace + runner._made > shot.trace
 
 
 def test_peers_that_are_not_installed_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
