@@ -10,7 +10,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from tracer.acceleration.bundles import DOUBTFUL, doubtful_rays, nearest_of_neighbors
+from tracer.acceleration.bundles import DOUBTFUL, RAYS, Bundles, doubtful_rays, nearest_of_neighbors
 from tracer.acceleration.triangle import TriangleTables
 from tracer.backends import Backend
 from tracer.canvas import Canvas, DeviceCanvas
@@ -62,10 +62,11 @@ def bundled(
     """What so many rays meet, in bundles; see `nearest_of_neighbors`."""
     assert scene.triangles is not None
 
-    def ray_of(number: Any) -> tuple[Any, Any]:
-        return _ray_of(scene.backend, canvas, place, size, number)
+    def bundles_of(bundle: Any) -> Bundles:
+        rays = [_ray_of(scene.backend, canvas, place, size, bundle * RAYS + k) for k in range(RAYS)]
+        return Bundles.of(canvas.eye, rays)
 
-    primitive = nearest_of_neighbors(scene.backend, scene.triangles, canvas.eye, rays, ray_of)
+    primitive = nearest_of_neighbors(scene.backend, scene.triangles, rays, bundles_of)
     return {"primitive": primitive}
 
 

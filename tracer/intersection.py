@@ -95,7 +95,7 @@ def closest_hit(
         hit = scene.sphere_table.closest(ray, hit, active)
     if scene.triangles is not None:
         if known is not None:
-            hit = _known_triangle(scene, ray, hit, active & known.mask, known.primitive)
+            hit = known_triangle(scene, ray, hit, active & known.mask, known.primitive)
             active = active & ~known.mask
         hit = _closest_triangle(scene, ray, hit, active)
     return hit
@@ -121,7 +121,7 @@ def _closest_triangle(scene: DeviceScene, ray: Ray, hit: Hit, active: Any) -> Hi
     )
 
 
-def _known_triangle(scene: DeviceScene, ray: Ray, hit: Hit, active: Any, primitive: Any) -> Hit:
+def known_triangle(scene: DeviceScene, ray: Ray, hit: Hit, active: Any, primitive: Any) -> Hit:
     """The nearer of a hit and of that on a triangle that the ray is known to meet."""
     assert scene.triangles is not None
     backend, tables = scene.backend, scene.triangles

@@ -21,6 +21,7 @@ from tracer.backends import Backend, exact_arithmetic, find_backend
 from tracer.device_scene import compile_scene
 from tracer.intersection import closest_hit, free_ray
 from tracer.queries import intersect
+from tracer.ray import Ray, no_hit
 
 Query = Callable[[], Any]
 """Traces all rays of one kind once; the mask of those that hit something."""
@@ -81,7 +82,7 @@ class Ours:
     def query(self, rays: Rays, kind: str) -> Query:
         """Closest hits, or any hit for shadow rays."""
         backend = self._backend
-        o, d = (_vector(backend.Vector3, a) for a in (rays.o, rays.d))
+        o, d = (backend.Vector3(*map(backend.table, a.T)) for a in (rays.o, rays.d))
         limit = None if rays.length is None else backend.Float(rays.length)
         active = dr.full(backend.Bool, True, rays.count)
         eye = backend.opaque_vector(EYE)
@@ -111,25 +112,35 @@ class Ours:
 
 
 def closest_of_neighbors(device: Any, o: Any, d: Any, eye: Any, active: Any) -> Any:
-    """Closest hits of rays from one eye, as the renderer finds those of its primary rays: in bundles."""
-    from tracer.acceleration.bundles import doubtful_rays, nearest_of_neighbors
-    from tracer.intersection import Known, closest_triangle
+    """Closest hits of rays that start in one eye, as the renderer finds those of its primary rays: in
+    bundles."""
+    from tracer.acceleration.bundles import RAYS, Bundles, doubtful_rays, nearest_of_neighbors
+    from tracer.intersection import closest_triangle, known_triangle
 
     backend = device.backend
 
-    def ray_of(number: Any) -> tuple[Any, Any]:
-        return eye + dr.zeros(backend.Vector3, dr.width(number)), dr.gather(backend.Vector3, d, number)
+    def bundles_of(bundle: Any) -> Bundles:
+        packets = [
+            [
+                dr.gather(backend.FloatN, c, bundle * (RAYS // 8) + half, shape=(8, dr.width(bundle)))
+                for c in d
+            ]
+            for half in range(RAYS // 8)
+        ]
+        directions = [backend.Vector3(*(part[k] for part in packet)) for packet in packets for k in range(8)]
+        return Bundles(eye, directions, [dr.zeros(backend.Float, dr.width(bundle))] * RAYS)
 
-    first = nearest_of_neighbors(backend, device.triangles, eye, dr.width(d), ray_of)
+    first = nearest_of_neighbors(backend, device.triangles, dr.width(d), bundles_of)
     numbers = doubtful_rays(first)
     if len(numbers) > 0:
-        ray = free_ray(device, *ray_of(numbers))
+        ray = free_ray(device, dr.gather(type(o), o, numbers), dr.gather(type(d), d, numbers))
         found = closest_triangle(device, ray, dr.full(backend.Bool, True, len(numbers)))
         dr.scatter(first, found.primitive, numbers)
-    return closest_hit(device, free_ray(device, o, d), active, known=Known(active, first))
+    nothing = no_hit(backend, dr.width(d))
+    return known_triangle(device, free_ray(device, o, d), nothing, active, first)
 
 
-def any_triangle(device: Any, ray: Any, length: Any, active: Any) -> Any:
+def any_triangle(device: Any, ray: Ray, length: Any, active: Any) -> Any:
     """Mask: some triangle is hit before `length`; the walk ends with the first."""
     from tracer.acceleration.traverse import visit_triangles
     from tracer.intersection import departure

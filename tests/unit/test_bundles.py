@@ -101,10 +101,7 @@ def both_ways(device: DeviceScene, canvas: Canvas) -> tuple[Array, Array]:
         on_device, ray_of = picture_rays(backend, canvas)
         bundle = dr.arange(backend.UInt32, PIXELS**2 // RAYS)
         rays = [ray_of(bundle * RAYS + k) for k in range(RAYS)]
-        starts = [dr.sqrt(dr.squared_norm(o - on_device.eye)) for o, _ in rays]
-        found = nearest_of_bundles(
-            backend, device.triangles, Bundles(on_device.eye, [d for _, d in rays], starts)
-        )
+        found = nearest_of_bundles(backend, device.triangles, Bundles.of(on_device.eye, rays))
         dr.eval(found)
         o, d = ray_of(dr.arange(backend.UInt32, PIXELS**2))
         singly = closest_triangle(device, free_ray(device, o, d), dr.full(backend.Bool, True, PIXELS**2))

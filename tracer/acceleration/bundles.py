@@ -60,23 +60,25 @@ class Bundles:
     directions: list[Any]
     starts: list[Any]
 
+    @staticmethod
+    def of(eye: Any, rays: list[tuple[Any, Any]]) -> Bundles:
+        """From the origins and unit directions (3, n) of RAYS rays, on lines through the eye."""
+        return Bundles(eye, [d for _, d in rays], [dr.sqrt(dr.squared_norm(o - eye)) for o, _ in rays])
+
 
 def nearest_of_neighbors(
-    backend: Backend, tables: TriangleTables, eye: Any, count: int, ray_of: Callable[[Any], tuple[Any, Any]]
+    backend: Backend, tables: TriangleTables, count: int, bundles_of: Callable[[Any], Bundles]
 ) -> Any:
-    """For each of `count` rays from an eye (3, 1) the primitive (count,) that it meets first, `INVALID` for
-    none, `DOUBTFUL` where that is not certain.
+    """For each of `count` rays the primitive (count,) that it meets first, `INVALID` for none, `DOUBTFUL`
+    where that is not certain.
 
-    `ray_of(numbers)`: origins and unit directions (3, n) of some rays, on lines through the eye; RAYS of them
-    with consecutive numbers are a bundle.
+    `bundles_of(numbers)`: bundles by number; RAYS rays with consecutive numbers are one.
     """
     bundle = dr.arange(backend.UInt32, count // RAYS)
-    rays = [ray_of(bundle * RAYS + k) for k in range(RAYS)]
-    bundles = Bundles(eye, [d for _, d in rays], [dr.sqrt(dr.squared_norm(o - eye)) for o, _ in rays])
     result = dr.empty(backend.UInt32, count)
-    found = nearest_of_bundles(backend, tables, bundles)
-    for k in range(RAYS):  # in any other mode each starts a kernel of its own, with all of the walk
-        dr.scatter(result, found[k], bundle * RAYS + k, mode=dr.ReduceMode.Permute)
+    for k, found in enumerate(nearest_of_bundles(backend, tables, bundles_of(bundle))):
+        # In any other mode each starts a kernel of its own, with all of the walk.
+        dr.scatter(result, found, bundle * RAYS + k, mode=dr.ReduceMode.Permute)
     return result
 
 
