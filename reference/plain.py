@@ -187,11 +187,13 @@ class World:
 
 @dataclass(frozen=True)
 class LightSample:
-    """One shining point; `share` is its part of all weights (section 2)."""
+    """One shining point of a light; `share` is its part of all weights (section 2), `part` of its light."""
 
     position: Vec
     share: float
     color: Vec
+    light: int
+    part: float
 
 
 @dataclass
@@ -267,6 +269,8 @@ class Node:
     diffuse_light: Vec = BLACK  # D
     specular_light: Vec = BLACK  # H
     children: Sequence[Node] = ()
+    surface: Surface | None = None
+    arriving: Sequence[float] = ()  # share of each light that arrives
 
 
 class PathVertex(NamedTuple):
@@ -453,10 +457,10 @@ def trace(
         color = world.background if level == 0 or world.secondary_background else BLACK
         return Node(kind, level, weight, factor, ray.o, ray.d, color)
     surface = surface_at(world, ray, hit)
-    diffuse, specular = light_terms(walk, ray, surface)
+    diffuse, specular, arriving = light_terms(walk, ray, surface)
     children = trace_children(walk, ray, surface, level, weight)
     color = shade(world.ambient, surface, diffuse, specular, children)
-    seen = (hit.t, hit.shape, hit.primitive, surface.color, diffuse, specular, children)
+    seen = (hit.t, hit.shape, hit.primitive, surface.color, diffuse, specular, children, surface, arriving)
     return Node(kind, level, weight, factor, ray.o, ray.d, color, *seen)
 
 
@@ -550,10 +554,10 @@ def trace_path(
 # ---- Light and shadow (sections 2 and 4) -------------------------------------------------------
 
 
-def light_terms(walk: Walk, ray: Ray, surface: Surface) -> tuple[Vec, Vec]:
-    """D = sum w V max(0, n.l) and H = sum w V [n.l > 0] max(0, r.v)^s (section 2)."""
+def light_terms(walk: Walk, ray: Ray, surface: Surface) -> tuple[Vec, Vec, list[float]]:
+    """D = sum w V max(0, n.l) and H = sum w V [n.l > 0] max(0, r.v)^s (section 2); V of each light."""
     world, p, n, v = walk.world, surface.hit.position, surface.shading, -ray.d
-    diffuse, specular = BLACK, BLACK
+    diffuse, specular, shares = BLACK, BLACK, [0.0] * len(world.lights)
     for light in walk.lights:
         distance = norm(light.position - p)
         if light.share == 0 or distance == 0:
@@ -564,11 +568,13 @@ def light_terms(walk: Walk, ray: Ray, surface: Surface) -> tuple[Vec, Vec]:
             continue
         walk.counts["shadow"] += 1
         shadow_ray = leave(world, ray, surface.hit, to_light, surface.facing)
-        arriving = light.share * visibility(world, shadow_ray, light.position) * light.color
+        seen = visibility(world, shadow_ray, light.position)
+        shares[light.light] += light.part * seen
+        arriving = light.share * seen * light.color
         highlight = max(0.0, dot(2 * lambert * n - to_light, v))  # r.v
         diffuse += (highlight if world.diffuse_reflection else lambert) * arriving
         specular += highlight**surface.material.shininess * arriving
-    return diffuse, specular
+    return diffuse, specular, shares
 
 
 def visibility(world: World, ray: Ray, light: Vec) -> float:
@@ -1017,7 +1023,8 @@ def light_samples(world: World, pixel: int, sub_ray: int) -> list[LightSample]:
             words = philox((pixel, sub_ray, number, 0), (world.seed % 2**32, LIGHT_JITTER_STREAM))
             u0, u1 = as_fraction(words[0]), as_fraction(words[1])
         points = (light.point(k, u0, u1) for k in range(light.samples))
-        samples += [LightSample(point, light.share / light.samples, light.color) for point in points]
+        part = 1 / light.samples
+        samples += [LightSample(point, light.share * part, light.color, number, part) for point in points]
     return samples
 
 

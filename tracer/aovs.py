@@ -1,5 +1,5 @@
-"""Layers of the nearest sub-ray's hit: computed again from the pixel and the primitive, not carried by the
-loop."""
+"""Layers: of the nearest sub-ray's hit, computed again from the pixel and the primitive and not carried by
+the loop; of the counts of rays; and the sums of `tracer.sums`."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ import drjit as dr
 
 from tracer.canvas import DeviceCanvas
 from tracer.device_scene import DeviceScene
+from tracer.film.layout import VISIBILITY
 from tracer.intersection import Surface, free_ray, surface_at
 from tracer.pixels import PixelGrid, primary_ray
 from tracer.ray import Hit
 from tracer.spawn import material_at
+from tracer.sums import PARTS
 from tracer.textures.tables import PICTURE, picture_coordinates
-from tracer.whitted import PixelColumns, texture_point
+from tracer.whitted import Counts, PixelColumns, texture_point
 
 Layer = Callable[[DeviceScene, Surface, Any, Any], Any]
 """(scene, surface, primitive, mask of hits) -> values (n,) or (components, n)."""
@@ -56,11 +58,32 @@ LAYERS: dict[str, Layer] = {
 }
 """A new layer of the first hit is one line here."""
 
+COUNTS: dict[str, Callable[[Counts, Any], Any]] = {
+    "level": lambda counts, sub_rays: counts.deepest_level,
+    "rays": lambda counts, sub_rays: (
+        sub_rays + counts.shadow + counts.reflected + counts.refracted + counts.total_reflection
+    ),
+}
+"""Layers that are made of a pixel's counts, and of the number of its sub-rays."""
+
+NAMES = (*LAYERS, VISIBILITY, *COUNTS, *PARTS)
+"""All layers but the depth, which every picture has."""
+
 
 def compute_layers(
     scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, found: PixelColumns, names: Sequence[str]
 ) -> dict[str, Any]:
-    """Values of the layers for the pixels of a launch; NaN and -1 where nothing was hit."""
+    """Values of the layers for the pixels of a launch, (n,) or one for each component."""
+    values = dict(found.sums)
+    values |= {name: COUNTS[name](found.counts, pixels.n * pixels.n) for name in names if name in COUNTS}
+    at_hit = [name for name in names if name in LAYERS]
+    return values | (_at_first_hits(scene, canvas, pixels, found, at_hit) if at_hit else {})
+
+
+def _at_first_hits(
+    scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, found: PixelColumns, names: Sequence[str]
+) -> dict[str, Any]:
+    """NaN and -1 where nothing was hit."""
     backend = scene.backend
     o, d = primary_ray(backend, canvas, pixels, found.sub_ray)
     valid = found.depth >= 0

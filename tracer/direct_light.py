@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import drjit as dr
 
+from tracer.arrival import NOTHING_WATCHED, DirectLight, Finish, Watch, arrive, segment_to
 from tracer.backends import INVALID, Backend
 from tracer.device_scene import DeviceScene
-from tracer.intersection import Surface, leave
+from tracer.intersection import Surface
 from tracer.light_tables import (
     LightSample,
     UnrolledLight,
@@ -27,82 +27,25 @@ from tracer.occlusion import (
     hidden_by_sphere,
     transmittance,
 )
-from tracer.ray import Ray, Segment, max_abs
+from tracer.ray import Ray, max_abs
 from tracer.shafts import Ball, Suspects
 from tracer.shapes.plane import PlaneSlot
 
-VANISHING = -1000
-"""Highlights of 2^-1000 and less are none."""
-
-
-@dataclass
-class Finish:
-    """The local part of a material at n hits: factors `diffuse` m and `specular` h, exponent `shininess`
-    s."""
-
-    diffuse: Any
-    specular: Any
-    shininess: Any
-
-
-@dataclass
-class Arrival:
-    """What one point light would add at n hits: `local` m D + h H before color and shadow, mask `lit` where
-    the surface faces it, and the `segment` to the light."""
-
-    local: Any
-    lit: Any
-    segment: Segment
-
 
 def direct_light(
-    scene: DeviceScene, ray: Ray, surface: Surface, finish: Finish, pixel: Any, sub_ray: Any, active: Any
-) -> tuple[Any, Any]:
-    """m D + h H (3, n) over all light samples, and the number of shadow rays (n,): of samples whose light
-    is asked for, also where the answer for a whole light is known at once."""
+    scene: DeviceScene,
+    ray: Ray,
+    surface: Surface,
+    finish: Finish,
+    pixel: Any,
+    sub_ray: Any,
+    active: Any,
+    watch: Watch = NOTHING_WATCHED,
+) -> DirectLight:
+    """The light of all samples that arrives at hits."""
     if scene.lights.unrolled is None or scene.options.transparent_shadows:
-        return _looped(scene, ray, surface, finish, pixel, sub_ray, active)
-    return _unrolled(scene, ray, surface, finish, scene.lights.unrolled, active)
-
-
-@dr.syntax
-def _power(base: Any, exponent: Any, active: Any) -> Any:
-    """base^exponent with 0^0 = 1; a branch, since most packets of lanes have no highlight to raise."""
-    result = dr.zeros(type(base), dr.width(active))
-    if active:
-        binary = exponent * dr.log2(base)
-        # Dr.Jit's exponential gives -inf, not 0, where the result leaves the range of double precision.
-        power = dr.select(binary > VANISHING, dr.exp2(binary), 0)
-        result = dr.select(exponent == 0, 1, power)
-    return result
-
-
-def arrive(scene: DeviceScene, ray: Ray, surface: Surface, finish: Finish, sample: LightSample) -> Arrival:
-    """What one point light would add to m D + h H.
-
-    l = (L - p)/|L - p|, r = 2(n.l)n - l, v = -d; both terms are 0 unless n.l > 0 (for a smooth mesh: by its
-    geometric normal too) and where the light lies on the shaded point.
-    """
-    segment = segment_to(ray, surface, sample)
-    l = segment.ray.d  # noqa: E741 - the document's letter
-    cosine = dr.dot(surface.normal, l)
-    lit = (cosine > 0) & (segment.length > 0)
-    if scene.smooth is not None:
-        lit = lit & (dr.dot(surface.lit_side, l) > 0)
-    mirrored = dr.dot(surface.mirrored, l)
-    mirrored = dr.select(mirrored > 0, mirrored, 0)
-    matters = lit & (finish.specular > 0) & ((mirrored > 0) | (finish.shininess == 0))
-    highlight = _power(mirrored, finish.shininess, matters)
-    diffuse = cosine if scene.options.diffuse_is_lambert else mirrored
-    return Arrival(dr.fma(finish.diffuse, diffuse, finish.specular * highlight), lit, segment)
-
-
-def segment_to(ray: Ray, surface: Surface, sample: LightSample) -> Segment:
-    """The straight way from the surface to a light."""
-    to_light = sample.position - surface.p
-    length = dr.sqrt(dr.squared_norm(to_light))
-    way = leave(ray, surface, to_light * dr.rcp(length), crosses=False)
-    return Segment(way, length, sample.position, sample.sides, sample.decided)
+        return _looped(scene, ray, surface, finish, pixel, sub_ray, active, watch)
+    return _unrolled(scene, ray, surface, finish, scene.lights.unrolled, active, watch)
 
 
 # ---- Few lights: all samples stand in the kernel -----------------------------------------------------------
@@ -115,34 +58,44 @@ def _unrolled(
     finish: Finish,
     lights: list[UnrolledLight],
     active: Any,
-) -> tuple[Any, Any]:
+    watch: Watch,
+) -> DirectLight:
     backend = scene.backend
     width = dr.width(active)
-    total, shadow_rays = dr.zeros(backend.Vector3, width), dr.zeros(backend.UInt32, width)
     facing = [active & _may_be_lit(backend, surface, light.ball) for light in lights]
     dark = _dark_samples(scene, ray, surface, lights, facing)
 
-    def shade(total: Any, shadow_rays: Any, light: UnrolledLight, faces: Any) -> tuple[Any, Any]:
-        share = dr.zeros(backend.Float, width)
+    def shade(
+        received: DirectLight, seen: list[Any], light: UnrolledLight, faces: Any
+    ) -> tuple[DirectLight, list[Any]]:
+        share, shadow_rays = dr.zeros(backend.Float, width), received.shadow_rays
+        highlight, arrived = dr.zeros(backend.Float, width), dr.zeros(backend.UInt32, width)
         for number, sample in enumerate(light.samples, light.first):
             arrival = arrive(scene, ray, surface, finish, sample)
             lit = arrival.lit & faces
             blocked = hidden_by_plane(scene, arrival.segment, lit) | ((dark >> number) & 1 != 0)
             if len(light.samples) == 1:
                 blocked = blocked | hidden_by_sphere(scene, arrival.segment, lit)
-            share = share + dr.select(lit & ~blocked, arrival.local, 0)
+            arrives = lit & ~blocked
+            share = share + dr.select(arrives, arrival.local, 0)
+            highlight = highlight + dr.select(arrives, arrival.specular, 0)
+            arrived = arrived + dr.select(arrives, backend.UInt32(1), 0)
             shadow_rays = shadow_rays + dr.select(lit, backend.UInt32(1), 0)
-        return dr.fma(share, light.color, total), shadow_rays
+        part = backend.Float(arrived) / len(light.samples)
+        Watch(False, seen, watch.lanes).add(backend.UInt32(light.number), part, True)
+        specular = [dr.fma(highlight, light.color, before) for before in received.specular]
+        return DirectLight(dr.fma(share, light.color, received.total), shadow_rays, specular), seen
 
+    received = DirectLight.none(backend, width, watch)
     for light, faces in zip(lights, facing, strict=True):
-        total, shadow_rays = dr.if_stmt(
-            args=(total, shadow_rays),
+        received, _ = dr.if_stmt(
+            args=(received, watch.seen),
             cond=faces,
             true_fn=partial(shade, light=light, faces=faces),
-            false_fn=lambda total, shadow_rays: (total, shadow_rays),
+            false_fn=lambda received, seen: (received, seen),
             label="light",
         )
-    return total, shadow_rays
+    return received
 
 
 def _may_be_lit(backend: Backend, surface: Surface, ball: Ball) -> Any:
@@ -194,12 +147,21 @@ def _dark_samples(
 
 
 def _looped(
-    scene: DeviceScene, ray: Ray, surface: Surface, finish: Finish, pixel: Any, sub_ray: Any, active: Any
-) -> tuple[Any, Any]:
+    scene: DeviceScene,
+    ray: Ray,
+    surface: Surface,
+    finish: Finish,
+    pixel: Any,
+    sub_ray: Any,
+    active: Any,
+    watch: Watch,
+) -> DirectLight:
     backend, lights = scene.backend, scene.lights
     width = dr.width(active)
 
-    def body(i: Any, light: Any, who: Suspects, shift: Any, total: Any, shadow_rays: Any) -> tuple[Any, ...]:
+    def body(
+        i: Any, light: Any, who: Suspects, shift: Any, received: DirectLight, seen: list[Any]
+    ) -> tuple[Any, ...]:
         number = dr.gather(backend.UInt32, lights.lights, i)
 
         def next_light(who: Suspects, shift: Any) -> tuple[Suspects, Any]:
@@ -215,31 +177,36 @@ def _looped(
             false_fn=lambda who, shift: (who, shift),
             label="next light",
         )
-        sample, color = fetch_sample(backend, lights, i, shift, lambda p: _sides_and_decided(scene, p))
+        sample, color, part = fetch_sample(backend, lights, i, shift, lambda p: plane_bits_of(scene, p))
         arrival = arrive(scene, ray, surface, finish, sample)
         lit = active & arrival.lit
         if scene.options.transparent_shadows:
             share = transmittance(scene, arrival.segment, surface, who, lit)
         else:
             share = dr.select(hidden(scene, arrival.segment, surface, who, lit), backend.Float(0), 1)
-        total = total + dr.select(lit, share * arrival.local * color, 0)
-        return i + 1, number, who, shift, total, shadow_rays + dr.select(lit, backend.UInt32(1), 0)
+        Watch(False, seen, watch.lanes).add(number, share * part, lit)
+        specular = [
+            before + dr.select(lit, share * arrival.specular * color, 0) for before in received.specular
+        ]
+        total = received.total + dr.select(lit, share * arrival.local * color, 0)
+        shadow_rays = received.shadow_rays + dr.select(lit, backend.UInt32(1), 0)
+        return i + 1, number, who, shift, DirectLight(total, shadow_rays, specular), seen
 
     start = (
         dr.select(active, dr.zeros(backend.UInt32, width), lights.count),
         dr.full(backend.UInt32, INVALID, width),
         Suspects.nobody(backend, width),
         dr.zeros(backend.Vector2, width),
-        dr.zeros(backend.Vector3, width),
-        dr.zeros(backend.UInt32, width),
+        DirectLight.none(backend, width, watch),
+        watch.seen,
     )
-    *_, total, shadow_rays = dr.while_loop(
+    *_, received, _ = dr.while_loop(
         state=start, cond=lambda i, *_: i < lights.count, body=body, label="lights"
     )
-    return total, shadow_rays
+    return received
 
 
-def _sides_and_decided(scene: DeviceScene, p: Any) -> tuple[Any, Any]:
+def plane_bits_of(scene: DeviceScene, p: Any) -> tuple[Any, Any]:
     """A light's bits for the planes, and which of them count: a light on a plane is not hidden by it."""
     backend = scene.backend
     sides, decided = backend.UInt32(0), backend.UInt32(0)

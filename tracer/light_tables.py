@@ -21,8 +21,8 @@ UNROLLED_LIGHTS, UNROLLED_SAMPLES = 4, 32
 bit a sample must fit a word."""
 
 ROW = 16
-"""Floats of a sample: base (3), A (3), first, B (3), second, color times share of the light (3), and 2
-unused."""
+"""Floats of a sample: base (3), A (3), first, B (3), second, color times share of the light (3), its part of
+the light (1/n), and 1 unused."""
 
 
 @dataclass
@@ -36,9 +36,10 @@ class LightSample:
 
 @dataclass
 class UnrolledLight:
-    """A light that stands in the kernel: `color` times the share of each of its `samples`, the `ball` that
-    holds them, and the number of the `first` one among all."""
+    """A light that stands in the kernel: its `number`, `color` times the share of each of its `samples`, the
+    `ball` that holds them, and the number of the `first` one among all."""
 
+    number: int
     color: Any
     ball: Ball
     samples: list[LightSample]
@@ -67,6 +68,11 @@ class LightTables:
     areas: bool
     unrolled: list[UnrolledLight] | None
 
+    @property
+    def number(self) -> int:
+        """How many lights there are, those without weight too; 1 for none."""
+        return len(self.balls) // 4
+
 
 def compile_lights(
     backend: Backend, lights: Sequence[LightRecord], colors: np.ndarray, planes: np.ndarray, seed: int
@@ -86,6 +92,7 @@ def compile_lights(
         jitter = bool(getattr(light, "jitter", False))
         block = _rows(samples, jitter)
         block[:, 11:14] = light.weight / total / len(block) * colors[number]
+        block[:, 14] = 1 / len(block)
         balls[number] = ball_around(_reached(block), backend.epsilon)
         blocks.append(block)
         kinds.append(np.full(len(block), samples.kind if jitter else POINT))
@@ -163,7 +170,8 @@ def _unrolled(
             for i in own
         ]
         color = backend.opaque_vector(rows[own[0], 11:14])
-        result.append(UnrolledLight(color, Ball.of(backend, balls[number]), samples, int(own[0])))
+        ball = Ball.of(backend, balls[number])
+        result.append(UnrolledLight(int(number), color, ball, samples, int(own[0])))
     return result
 
 
@@ -181,9 +189,9 @@ def fetch_ball(backend: Backend, tables: LightTables, light: Any) -> Ball:
 
 def fetch_sample(
     backend: Backend, tables: LightTables, i: Any, shift: Any, plane_sides: Callable[[Any], tuple[Any, Any]]
-) -> tuple[LightSample, Any]:
-    """Sample i of the table and its color; `shift` (2, n) jitters it, and then `plane_sides(point)` gives its
-    bits."""
+) -> tuple[LightSample, Any, Any]:
+    """Sample i of the table, its color, its part of the light; `shift` (2, n) jitters it, and then
+    `plane_sides(point)` gives its bits."""
     a, b, c, d = (dr.gather(backend.Vector4, tables.rows, i * (ROW // 4) + k) for k in range(ROW // 4))
     vector = backend.Vector3
     position = vector(a.x, a.y, a.z)
@@ -196,7 +204,7 @@ def fetch_sample(
         moved = plane_sides(position)
         sides = dr.select(kind == POINT, sides, moved[0])
         decided = dr.select(kind == POINT, decided, moved[1])
-    return LightSample(position, sides, decided), vector(c.w, d.x, d.y)
+    return LightSample(position, sides, decided), vector(c.w, d.x, d.y), d.z
 
 
 def jitter_shift(backend: Backend, tables: LightTables, light: Any, pixel: Any, sub_ray: Any) -> Any:

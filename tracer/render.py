@@ -13,13 +13,14 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from tracer.aovs import compute_layers
+from tracer.aovs import NAMES, compute_layers
 from tracer.backends import Backend, exact_arithmetic, find_backend, thread_count
 from tracer.canvas import DeviceCanvas
 from tracer.color import encode_srgb
 from tracer.device_scene import DeviceScene, compile_scene
 from tracer.film.depth_of_field import depth_of_field, rectangle_needed
 from tracer.film.film import Film
+from tracer.film.layout import VISIBILITY
 from tracer.film.result import Result
 from tracer.first_hits import first_triangles
 from tracer.pixels import BandPlace, pixels_of
@@ -67,7 +68,7 @@ def render(
         precision: "single" or "double".
         backend: "auto" (CUDA where there is a GPU, else LLVM), "llvm" or "cuda".
         supersample: n for n x n rays a pixel, 1 to 64; None: as the scene says.
-        aovs: names of layers, or "all": depth, normal, Ng, position, shape, primitive, uv.
+        aovs: names of layers, or "all"; `docs/layers.md` has the list.
         scale: size of the picture against the scene's resolution; the framing stays.
         resolution: (width, height) in pixels instead; the vertical extent of the canvas stays.
         crop: (x0, y0, x1, y1) in pixels of the full picture, end exclusive.
@@ -99,7 +100,7 @@ class _Job:
         self.canvas = picture_canvas(scene, settings)
         self.rectangle = picture_rectangle(settings.crop, self.canvas)
         self.n = settings.supersample or scene.camera.supersample
-        self.layers = [name for name in settings.aovs if name != "depth"]
+        self.layers = [name for name in settings.aovs if name in layers_of(scene)]
         self.device: DeviceScene = compile_scene(scene, backend)
         self.device_canvas = DeviceCanvas.of(backend, self.canvas)
         self.seconds = {"compile": time.perf_counter() - started, "trace": 0.0, "filter": 0.0}
@@ -140,7 +141,7 @@ class _Job:
         size = (band.width, band.height)
         first = first_triangles(self.device, self.canvas, self.device_canvas, place, size, self.n)
         found = trace_band(self.device, self.device_canvas, place, size, first, tuple(self.layers))
-        totals = {name: int(found.pop(name).numpy()[0]) for name in COUNTERS}
+        totals = {name: int(found.pop(count_of(name)).numpy()[0]) for name in COUNTERS}
         film.take(band, {name: values.numpy() for name, values in found.items()})
         film.counts["primary"] += band.width * band.height * self.n**2
         for name, total in totals.items():
@@ -196,6 +197,11 @@ class _Job:
         }
 
 
+def layers_of(scene: Scene) -> list[str]:
+    """The layers that a picture of the scene can have besides the depth; no visibility without lights."""
+    return [name for name in NAMES if name != VISIBILITY or scene.lights]
+
+
 def scene_hash(scene: Scene) -> str:
     """SHA-256 of the scene's keys: equal scenes have equal hashes wherever they come from."""
     return hashlib.sha256(json.dumps(scene.to_dict(), sort_keys=True).encode()).hexdigest()
@@ -211,13 +217,12 @@ def trace_band(
     layers: tuple[str, ...],
 ) -> dict[str, Any]:
     """The layers of a band of `size` columns and rows, pixels in the order of the picture, components last,
-    and the counters of `COUNTERS` (1,). `first`: see `first_triangles`."""
+    and the counters of `COUNTERS` (1,), each under its `count_of`. `first`: see `first_triangles`."""
     backend = device.backend
     pixels = pixels_of(backend, place, size, dr.arange(backend.UInt32, lane_count(*size)))
-    found = trace_pixels(device, canvas, pixels, first)
+    found = trace_pixels(device, canvas, pixels, first, layers)
     values = {"color": found.color, "alpha": found.coverage, "depth": found.depth, "z": found.view_depth}
     if layers:
-        dr.eval(found)
         values |= compute_layers(device, canvas, pixels, found, layers)
     index = (pixels.row - place.y0) * backend.opaque_id(size[0]) + (pixels.column - place.x0)
     picture = {name: _scattered(value, index, pixels.active, size) for name, value in values.items()}
@@ -229,7 +234,7 @@ def _scattered(value: Any, index: Any, active: Any, size: tuple[int, int]) -> An
 
     Each pixel is written by the one lane that owns it: no atomics.
     """
-    components = [value] if dr.depth_v(value) == 1 else list(value)
+    components = list(value) if isinstance(value, list) or dr.depth_v(value) > 1 else [value]
     target = dr.empty(type(components[0]), size[0] * size[1] * len(components))
     for k, component in enumerate(components):
         dr.scatter(target, component, index * len(components) + k, active, mode=dr.ReduceMode.Permute)
@@ -241,11 +246,17 @@ def _totals(backend: Backend, counts: Counts) -> dict[str, Any]:
 
     Whole numbers, so the order in which the lanes add them makes no difference.
     """
-    totals = {name: dr.zeros(backend.UInt64, 1) for name in COUNTERS}
-    for name, total in totals.items():
+    totals = {count_of(name): dr.zeros(backend.UInt64, 1) for name in COUNTERS}
+    for name in COUNTERS:
         op = dr.ReduceOp.Max if name == "deepest_level" else dr.ReduceOp.Add
-        dr.scatter_reduce(op, total, backend.UInt64(getattr(counts, name)), backend.UInt32(0))
+        lanes = backend.UInt64(getattr(counts, name))
+        dr.scatter_reduce(op, totals[count_of(name)], lanes, backend.UInt32(0))
     return totals
+
+
+def count_of(name: str) -> str:
+    """The name of a counter among the layers, some of which are called alike."""
+    return f"number of {name}"
 
 
 def _ray_count(counts: dict[str, int]) -> int:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tracer.aovs import LAYERS
+from tracer.aovs import NAMES
 from tracer.canvas import Canvas
 from tracer.errors import UsageError
 from tracer.scene import Scene
@@ -36,7 +36,7 @@ class Settings:
     def checked(self) -> Settings:
         """The settings with AOV names spelled out; raises `UsageError`."""
         aovs = (self.aovs,) if isinstance(self.aovs, str) else tuple(self.aovs)
-        known = ["depth", *LAYERS]
+        known = ["depth", *NAMES]
         if "all" in aovs:
             aovs = tuple(known)
         for name in aovs:

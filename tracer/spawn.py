@@ -7,8 +7,8 @@ from typing import Any
 
 import drjit as dr
 
+from tracer.arrival import Finish
 from tracer.device_scene import DeviceScene
-from tracer.direct_light import Finish
 from tracer.intersection import Surface, leave
 from tracer.path import make_path
 from tracer.ray import Ray, unit_again

@@ -14,6 +14,7 @@ from typing import Any
 import drjit as dr
 
 from tracer.acceleration.bundles import DOUBTFUL
+from tracer.arrival import DirectLight
 from tracer.backends import INVALID, Backend
 from tracer.canvas import DeviceCanvas
 from tracer.device_scene import DeviceScene
@@ -22,6 +23,7 @@ from tracer.intersection import Known, Surface, closest_hit, free_ray, surface_a
 from tracer.path import make_path, path_type
 from tracer.pixels import PixelGrid, primary_ray
 from tracer.spawn import material_at, spawn
+from tracer.sums import Sums
 from tracer.textures.tables import texture_color
 
 
@@ -29,7 +31,8 @@ from tracer.textures.tables import texture_color
 class PixelColumns:
     """What the loop finds for n pixels: mean `color` (3, n), `coverage` (share of sub-rays that hit), and of
     the nearest sub-ray `depth` (-1: none), `view_depth` (how far the hit is from the eye along the view
-    axis, infinite: none), `primitive` and `sub_ray`; `counts`: rays by kind."""
+    axis, infinite: none), `primitive` and `sub_ray`; `counts`: rays by kind; `sums`: the layers of
+    `tracer.sums` that are asked for, (components, n)."""
 
     color: Any
     coverage: Any
@@ -38,6 +41,7 @@ class PixelColumns:
     primitive: Any
     sub_ray: Any
     counts: Counts
+    sums: dict[str, Any]
 
 
 @dataclass
@@ -60,8 +64,11 @@ class Counts:
 
 
 @dr.syntax
-def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, first: Any) -> PixelColumns:
-    """The colors, depths and ray counts of pixels. `first`: see `first_triangles`."""
+def trace_pixels(
+    scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, first: Any, layers: tuple[str, ...] = ()
+) -> PixelColumns:
+    """The colors, depths and ray counts of pixels, and layers that are sums. `first`: see
+    `first_triangles`."""
     # ---- Loop state, all of it in full width ----
     backend = scene.backend
     width = dr.width(pixels.number)
@@ -78,6 +85,7 @@ def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, fi
     nearest = dr.full(backend.UInt32, INVALID, width)  # its primitive
     nearest_sub_ray = dr.zeros(backend.UInt32, width)  # its number
     counts = Counts.zero(backend, width)
+    sums = Sums.zero(scene, layers, width)
     active = backend.Bool(pixels.active)
 
     while dr.hint(active, label="whitted", exclude=[scene, canvas, pixels, first, backend, record]):
@@ -103,17 +111,20 @@ def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, fi
         material = material_at(scene, surface, found)
         point = texture_point(scene, surface, found)
         own = texture_color(backend, scene.textures, material.texture, point, found)
-        light, shadow_rays = direct_light(
-            scene, path.ray, surface, material.finish, pixels.number, sub_ray, found
-        )
-        counts.shadow += shadow_rays
+        watch = sums.watch(is_primary)
+        light = direct_light(scene, path.ray, surface, material.finish, pixels.number, sub_ray, found, watch)
+        counts.shadow += light.shadow_rays
         base = path.throughput * own
-        local = base * dr.fma(scene.not_ambient * material.absorption, light, scene.ambient)
+        local = base * dr.fma(scene.not_ambient * material.absorption, light.total, scene.ambient)
         sees_background = active & ~hit.valid
         if dr.hint(not scene.options.secondary_background, mode="scalar"):
             sees_background &= is_primary
         color += dr.select(found, local, 0)
         color += dr.select(sees_background, path.throughput * scene.background, 0)
+        if dr.hint(layers != (), mode="scalar"):
+            behind = dr.select(sees_background, path.throughput * scene.background, 0)
+            parts = _own_parts(scene, base, material.absorption, light, found, behind)
+            sums = sums.with_light(is_primary, parts, dr.select(found, local, behind))
 
         # ---- Its children ----
         children = spawn(scene, path, surface, material, base * scene.not_ambient, found)
@@ -137,6 +148,7 @@ def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, fi
         if dr.hint(pops, exclude=[scene, canvas, pixels, first, backend, record]):
             top -= 1
             path = stack.read(top)
+        sums = sums.with_next(path.level, refracts)
         fresh = active & ~reflects & ~refracts & ~pops
         sub_ray += dr.select(fresh, backend.UInt32(1), 0)
         active &= sub_ray < pixels.n * pixels.n
@@ -151,7 +163,21 @@ def trace_pixels(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, fi
         primitive=nearest,
         sub_ray=nearest_sub_ray,
         counts=counts,
+        sums=sums.layers(hits, share, scene.lights.number),
     )
+
+
+def _own_parts(
+    scene: DeviceScene, base: Any, absorption: Any, light: DirectLight, found: Any, behind: Any
+) -> dict[str, Any]:
+    """The parts of the light of hits themselves, and the background `behind` where nothing is hit, which
+    counts as ambient light; `base` (3, n): what their light is worth."""
+    direct = base * (scene.not_ambient * absorption)
+    parts = {"ambient": dr.select(found, base * scene.ambient, behind)}
+    for specular in light.specular:
+        parts["specular"] = dr.select(found, direct * specular, 0)
+        parts["diffuse"] = dr.select(found, direct * (light.total - specular), 0)
+    return parts
 
 
 def _known(backend: Backend, first: Any, number: Any, is_primary: Any) -> Known | None:

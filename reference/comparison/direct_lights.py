@@ -23,9 +23,10 @@ from reference.comparison.truth import Truth
 from reference.comparison.visibility import FARTHEST, border_distance, exact_visibility, has_lights
 from reference.mitsuba_scene import SHADOW_START
 from reference.tolerances import TOLERANCES
+from tracer.arrival import Finish
 from tracer.backends import exact_arithmetic, find_backend
 from tracer.device_scene import compile_scene
-from tracer.direct_light import Finish, direct_light
+from tracer.direct_light import direct_light
 from tracer.intersection import closest_hit, free_ray, surface_at
 from tracer.queries import END_GUARD
 
@@ -87,7 +88,7 @@ def lit_points(case: Case, scene: tracer.Scene, most: int) -> Lit:
         surface = surface_at(device, ray, hit, everything)
         none, one = dr.zeros(types.Float, most), dr.full(types.Float, 1, most)
         number = dr.zeros(types.UInt32, most)
-        light, _ = direct_light(device, ray, surface, Finish(one, none, one), number, number, hit.valid)
+        light = direct_light(device, ray, surface, Finish(one, none, one), number, number, hit.valid).total
         dr.eval(hit, surface, light)
     p, normal, lit_side = (
         v.numpy().T.astype(np.float64) for v in (surface.p, surface.normal, surface.lit_side)

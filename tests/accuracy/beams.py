@@ -15,9 +15,9 @@ from tests.accuracy.probe import compiled, directions, rotation, unit, upload
 from tests.accuracy.shafts import log_uniform, numbers, report, vectors
 from tracer.acceleration import beam
 from tracer.acceleration.triangle import Triangle, meet_triangle, projection_axes
+from tracer.arrival import segment_to
 from tracer.backends import exact_arithmetic, find_backend
 from tracer.device_scene import DeviceScene
-from tracer.direct_light import segment_to
 from tracer.intersection import Surface, closest_hit, free_ray, surface_at
 from tracer.light_tables import LightSample
 from tracer.occlusion import hidden_by_many

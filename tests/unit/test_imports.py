@@ -29,7 +29,13 @@ LAYERS: tuple[frozenset[str], ...] = (
 COMPARING = {"tracer.cli.validate", "tracer.cli.export", "tracer.cli.bench", "tracer.viewer.comparison"}
 """The only modules of `tracer` that see `mitsuba` and `reference`, and that inside functions alone."""
 
-INDEPENDENT = {"reference.plain", "reference.plain_files", "reference.plain_gltf", "reference.plain_polygons"}
+INDEPENDENT = {
+    "reference.plain",
+    "reference.plain_layers",
+    "reference.plain_files",
+    "reference.plain_gltf",
+    "reference.plain_polygons",
+}
 """The model written a second time: it shares no code with `tracer`."""
 
 

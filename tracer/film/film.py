@@ -6,9 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from tracer.film.layout import VISIBILITY
 from tracer.tiles import Band, Rectangle
 
-BLANK = {"color": 0, "alpha": 0, "depth": -1, "z": np.inf, "shape": -1, "primitive": -1}
+BLANK = {"color": 0, "alpha": 0, "depth": -1, "z": np.inf, "shape": -1, "primitive": -1} | dict.fromkeys(
+    ("level", "rays", "ambient", "diffuse", "specular", "reflected", "refracted"), 0
+)
 """What a layer holds where nothing was traced yet; NaN for the others."""
 
 
@@ -29,7 +32,7 @@ class Film:
         x0, y0, x1, y1 = self.rectangle
         for name, values in layers.items():
             rows: np.ndarray = values.reshape(band.height, band.width, -1)
-            if rows.shape[2] == 1:
+            if rows.shape[2] == 1 and name != VISIBILITY:
                 rows = rows[..., 0]
             if band.height == y1 - y0:
                 self.arrays[name] = rows

@@ -22,6 +22,8 @@ COMPONENTS: dict[str, tuple[str, ...]] = {
     "refracted": RGB,
 }
 IDS = frozenset({"shape", "primitive"})
+VISIBILITY = "visibility"
+"""Has a component for each light, also where there is only one."""
 
 
 def color_channels(color: NDArray, alpha: NDArray) -> dict[str, NDArray]:
@@ -50,6 +52,6 @@ def aov_channels(aovs: Mapping[str, NDArray]) -> dict[str, NDArray]:
 
 
 def _components(name: str, count: int) -> tuple[str, ...]:
-    if name == "visibility":
+    if name == VISIBILITY:
         return tuple(f"light{k}" for k in range(count))
     return COMPONENTS.get(name) or tuple(str(k) for k in range(count))
