@@ -18,6 +18,7 @@ from tracer.cli.info import info
 from tracer.cli.interruption import Interruption
 from tracer.cli.render import render
 from tracer.cli.scenes import scenes
+from tracer.cli.turntable import turntable
 from tracer.cli.validate import validate
 from tracer.version import __version__
 
@@ -45,7 +46,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (render, classic, scenes, info, compare, validate, bench, export, doctor):
+for _command in (render, turntable, classic, scenes, info, compare, validate, bench, export, doctor):
     cli.add_command(_command)
 
 

@@ -30,6 +30,21 @@ def scene_options(command: Command) -> Command:
     )(command)
 
 
+def animation_options(command: Command) -> Command:
+    """`--fps` and `--resume`: how an animation is rendered."""
+    command = click.option(
+        "--resume", is_flag=True, help="Keep the frames that an earlier run of the same command finished."
+    )(command)
+    return click.option(
+        "--fps",
+        type=click.FloatRange(0.1, 1000),
+        default=30.0,
+        show_default=True,
+        metavar="N",
+        help="Frames a second of a movie.",
+    )(command)
+
+
 def report_options(folder: str, what: str) -> Callable[[Command], Command]:
     """`--out`, `--json` and `--summary` of a command that writes a page; `what`: how it calls that page."""
 
@@ -66,7 +81,8 @@ _PICTURE_OPTIONS = (
         "outputs",
         multiple=True,
         metavar="FILE",
-        help="A .png, .exr or .npz file; {name} is the scene's name. Repeatable.  [default: {name}.png]",
+        help="A .png, .exr or .npz file; of frames also .mp4, .webm or .gif. {name} is the scene's name. "
+        "Repeatable.  [default: {name}.png]",
     ),
     click.option(
         "--scale", type=float, default=1.0, metavar="S", help="Size against the scene's resolution."

@@ -82,7 +82,7 @@ def render_scenes(
     if wishes.aovs and not any(
         Path(file).suffix.lower() != ".png" for job in plan.jobs for file in job.files
     ):
-        _warn("the layers of --aov go to .exr and .npz files, and -o names none", wishes)
+        warn("the layers of --aov go to .exr and .npz files, and -o names none", wishes)
     worst = plan.worst
     for job in plan.jobs:
         try:
@@ -107,7 +107,7 @@ class _Picture:
         """Traces and saves; returns the exit code."""
         started = time.perf_counter()
         for warning in warnings_of(self._job.scene):
-            _warn(warning, self._wishes)
+            warn(warning, self._wishes)
         self._seconds["load"] += time.perf_counter() - started
         kernels = KernelRecord(self._wishes.stats)
         try:
@@ -144,7 +144,7 @@ class _Picture:
     def _tell(self, result: Result, kernels: KernelRecord, seconds: float) -> None:
         lost = result.stats["ended_by_depth"]
         if lost:
-            _warn(
+            warn(
                 f"{self._job.scene.name}: max_depth = {self._job.scene.max_depth} ended {lost} "
                 f"path{'s' if lost > 1 else ''} whose light is missing",
                 self._wishes,
@@ -176,6 +176,7 @@ def _phases(result: Result) -> dict[str, float]:
     return {"tables": seconds["compile"], "trace": seconds["trace"], "filter": seconds["filter"]}
 
 
-def _warn(text: str, wishes: Wishes) -> None:
+def warn(text: str, wishes: Wishes) -> None:
+    """Says what is allowed and probably a mistake, unless nothing is to be said."""
     if not wishes.quiet:
         talk(f"warning: {text}")

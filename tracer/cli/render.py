@@ -7,15 +7,28 @@ from typing import Any
 import click
 
 from tracer.cli.interruption import Interruption
-from tracer.cli.options import picture_options, scene_options
+from tracer.cli.options import animation_options, picture_options, scene_options
 
 
 @click.command(short_help="Render scenes to pictures.")
 @click.argument("scenes", nargs=-1, required=True, metavar="SCENE...")
+@click.option(
+    "--frames",
+    metavar="A:B[:STEP]",
+    help="The frames A to B of the scene's [[animation]], B included, as NAME.0001.png or a movie.",
+)
+@animation_options
 @picture_options
 @scene_options
 @click.pass_obj
-def render(interruption: Interruption, scenes: tuple[str, ...], **options: Any) -> int:
+def render(
+    interruption: Interruption,
+    scenes: tuple[str, ...],
+    frames: str | None,
+    fps: float,
+    resume: bool,
+    **options: Any,
+) -> int:
     """Render each SCENE, a .toml file or a built-in name (see `tracer scenes`).
 
     Everything is checked before the first ray is traced. Of several scenes a bad one is left out, and the
@@ -32,7 +45,28 @@ def render(interruption: Interruption, scenes: tuple[str, ...], **options: Any) 
       tracer render room --precision double --supersample 4 --bits 16
 
     Ctrl-C keeps the finished rows in NAME.partial.png; a second one quits at once.
+
+    With --frames, -o names numbered pictures (a name without {frame} gets .0001 and so on) and movies: .mp4,
+    .webm or .gif. Ctrl-C finishes the frame in hand, and --resume goes on with the next one.
+
+    \b
+      tracer render my.toml --frames 1:240 -o out/{name}.{frame:04d}.exr -o {name}.mp4
     """
     from tracer.cli.pictures import Wishes, render_scenes
 
-    return render_scenes(scenes, Wishes(**options), interruption)
+    wishes = Wishes(**options)
+    if frames is None:
+        return render_scenes(scenes, wishes, interruption)
+
+    from tracer.cli.animation import Course, View, render_animations
+    from tracer.cli.frame_names import read_frames
+    from tracer.cli.pictures import warn
+    from tracer.scene import Scene
+
+    def animated(scene: Scene) -> View:
+        if not scene.animation:
+            warn(f"{scene.name}: has no [[animation]], so that all frames are the same", wishes)
+        return View(scene.at, "as the scene says")
+
+    course = Course(read_frames(frames), fps, resume)
+    return render_animations(scenes, wishes, course, animated, "{name}.png", interruption)

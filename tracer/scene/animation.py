@@ -42,7 +42,7 @@ class Track(Record):
     the first value, after its last time the last one."""
 
     key: Annotated[str, Field(strict=True, min_length=1, max_length=1000)] = Field(
-        description='path of the key as for `--set`: `camera.fov`, `lights.0.weight`, `shapes."my ball".center`'
+        description='path of the key, as for `--set`: `lights.0.weight`, `shapes."my ball".center`'
     )
     times: list[Real] = Field(min_length=1, description="frame numbers, each larger than the one before")
     values: list[KeyedValue] = Field(
