@@ -1,8 +1,8 @@
 """A Whitted ray tracer, vectorized with Dr.Jit, that you can trust to the last digit.
 
-`load` reads a scene, `render` makes a picture, `intersect`, `visible` and `trace_path` answer plain ray
-queries. The public names are imported when they are first used (PEP 562), so that `tracer --help` need not
-wait for Dr.Jit.
+`load` reads a scene, `render` makes a picture, `pixel_tree` takes one pixel apart, `intersect`,
+`visible` and `trace_path` answer plain ray queries. The public names are imported when they are first
+used (PEP 562), so that `tracer --help` need not wait for Dr.Jit.
 """
 
 from __future__ import annotations
@@ -17,7 +17,9 @@ from tracer.llvm import select_llvm
 if TYPE_CHECKING:
     from tracer.errors import MachineError, OutputError, SceneError, TracerError, UsageError
     from tracer.film.result import Result
+    from tracer.lens import pixel_tree
     from tracer.queries import Hits, Paths, intersect, trace_path, visible
+    from tracer.ray_tree import PixelTree, RayNode
     from tracer.render import RenderInterrupted, render
     from tracer.scene import Scene, json_schema, load
     from tracer.version import __version__
@@ -27,6 +29,8 @@ __all__ = [
     "MachineError",
     "OutputError",
     "Paths",
+    "PixelTree",
+    "RayNode",
     "RenderInterrupted",
     "Result",
     "Scene",
@@ -37,6 +41,7 @@ __all__ = [
     "intersect",
     "json_schema",
     "load",
+    "pixel_tree",
     "render",
     "trace_path",
     "visible",
@@ -45,6 +50,8 @@ __all__ = [
 _NAMES_OF_MODULES = {
     "tracer.errors": ("MachineError", "OutputError", "SceneError", "TracerError", "UsageError"),
     "tracer.film.result": ("Result",),
+    "tracer.lens": ("pixel_tree",),
+    "tracer.ray_tree": ("PixelTree", "RayNode"),
     "tracer.queries": ("Hits", "Paths", "intersect", "trace_path", "visible"),
     "tracer.render": ("RenderInterrupted", "render"),
     "tracer.scene": ("Scene", "json_schema", "load"),

@@ -91,7 +91,7 @@ def trace_pixels(
     while dr.hint(active, label="whitted", exclude=[scene, canvas, pixels, first, backend, record]):
         # ---- The next sub-ray of the pixel ----
         if dr.hint(fresh, exclude=[scene, canvas, pixels, first, backend, record]):
-            path = _primary(scene, canvas, pixels, sub_ray)
+            path = primary_path(scene, canvas, pixels, sub_ray)
 
         # ---- The nearest surface ----
         is_primary = path.level == 0
@@ -188,7 +188,7 @@ def _known(backend: Backend, first: Any, number: Any, is_primary: Any) -> Known 
     return Known(is_primary & (primitive != DOUBTFUL), primitive)
 
 
-def _primary(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, sub_ray: Any) -> Any:
+def primary_path(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, sub_ray: Any) -> Any:
     """The path of a pixel's sub-ray b n + a, through (i + (a + offset)/n, j + (b + offset)/n)."""
     backend = scene.backend
     o, d = primary_ray(backend, canvas, pixels, sub_ray)

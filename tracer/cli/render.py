@@ -8,6 +8,7 @@ import click
 
 from tracer.cli.interruption import Interruption
 from tracer.cli.options import animation_options, picture_options, scene_options
+from tracer.errors import UsageError
 
 
 @click.command(short_help="Render scenes to pictures.")
@@ -20,6 +21,13 @@ from tracer.cli.options import animation_options, picture_options, scene_options
 @animation_options
 @picture_options
 @scene_options
+@click.option(
+    "--pixel",
+    type=int,
+    nargs=2,
+    metavar="X Y",
+    help="Print the tree of rays of a pixel instead of rendering.",
+)
 @click.pass_obj
 def render(
     interruption: Interruption,
@@ -27,6 +35,7 @@ def render(
     frames: str | None,
     fps: float,
     resume: bool,
+    pixel: tuple[int, int] | None,
     **options: Any,
 ) -> int:
     """Render each SCENE, a .toml file or a built-in name (see `tracer scenes`).
@@ -43,6 +52,7 @@ def render(
       tracer render a.toml b.toml -o out/{name}.png -o out/{name}.exr --aov all
       tracer render room --set lights.0.weight=1 --set 'shapes."left ball".radius=90'
       tracer render room --precision double --supersample 4 --bits 16
+      tracer render room --pixel 300 200
 
     Ctrl-C keeps the finished rows in NAME.partial.png; a second one quits at once.
 
@@ -55,6 +65,12 @@ def render(
     from tracer.cli.pictures import Wishes, render_scenes
 
     wishes = Wishes(**options)
+    if pixel is not None:
+        from tracer.cli.pixel import show_pixels
+
+        if frames is not None:
+            raise UsageError("--pixel: shows one picture; leave out --frames")
+        return show_pixels(scenes, pixel, wishes)
     if frames is None:
         return render_scenes(scenes, wishes, interruption)
 

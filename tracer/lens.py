@@ -1,0 +1,245 @@
+"""Traces the tree of rays of one pixel, level by level, with the functions of the renderer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from tracer.backends import exact_arithmetic, find_backend
+from tracer.canvas import DeviceCanvas
+from tracer.color import decode_srgb
+from tracer.device_meshes import inherited
+from tracer.device_scene import DeviceScene, compile_scene
+from tracer.errors import UsageError
+from tracer.intersection import Surface, closest_hit, surface_at
+from tracer.lens_lights import LightsUnderTheLens, name_of, picked, triple
+from tracer.pixels import PixelGrid
+from tracer.ray_tree import EndedRay, HitPoint, LightTerm, PixelTree, RayNode
+from tracer.scene import Scene
+from tracer.settings import Settings, picture_canvas, with_seed
+from tracer.spawn import MaterialRow, material_at, spawn
+from tracer.textures.tables import texture_color
+from tracer.whitted import primary_path, texture_point
+
+
+def pixel_tree(
+    scene: Scene,
+    x: int,
+    y: int,
+    precision: str = "single",
+    backend: str = "auto",
+    supersample: int | None = None,
+    *,
+    scale: float = 1.0,
+    resolution: tuple[int, int] | None = None,
+    seed: int | None = None,
+) -> PixelTree:
+    """The tree of rays of pixel (column x, row y) of the picture that `tracer.render` gives with the same
+    settings; raises what that raises, and `UsageError` for a pixel outside the picture."""
+    settings = Settings(precision, backend, supersample, (), scale, resolution, seed=seed).checked()
+    types = find_backend(settings.backend, settings.precision)
+    scene = with_seed(scene, seed)
+    canvas = picture_canvas(scene, settings)
+    if not (0 <= x < canvas.width and 0 <= y < canvas.height):
+        raise UsageError(
+            f"pixel: {x} {y} is outside the picture; allowed is 0 <= X < {canvas.width} "
+            f"and 0 <= Y < {canvas.height}"
+        )
+    n = settings.supersample or scene.camera.supersample
+    with exact_arithmetic():
+        lens = _Lens(scene, compile_scene(scene, types))
+        roots = lens.look(DeviceCanvas.of(types, canvas), x, y, y * canvas.width + x, n)
+    return PixelTree(scene.name, x, y, n, scene.color_space == "linear", types.precision, tuple(roots))
+
+
+@dataclass
+class _Level:
+    """The rays of one level: `paths`, the numbers of their sub-rays, and for each its kind, its factor and
+    the list of nodes that it belongs to."""
+
+    paths: Any
+    sub_rays: np.ndarray
+    kinds: list[str]
+    factors: list[float]
+    homes: list[list[RayNode]]
+
+
+class _Lens:
+    """A scene, and the pixel that is looked at."""
+
+    def __init__(self, scene: Scene, device: DeviceScene) -> None:
+        self.scene, self.device, self.backend = scene, device, device.backend
+        self.lights = LightsUnderTheLens(scene, device)
+        background = np.array(scene.background)
+        self.background = decode_srgb(background) if scene.color_space == "linear" else background
+
+    def look(self, canvas: DeviceCanvas, x: int, y: int, number: int, n: int) -> list[RayNode]:
+        """The trees of the pixel's sub-rays."""
+        backend, count = self.backend, n * n
+        lane = dr.arange(backend.UInt32, count)
+        column, row, numbers = (dr.full(backend.UInt32, value, count) for value in (x, y, number))
+        self.pixel = number
+        active = dr.full(backend.Bool, True, count)
+        pixels = PixelGrid(lane, backend.opaque_id(count), column, row, numbers, backend.opaque_id(n), active)
+        self.share = 1 / count
+        roots: list[RayNode] = []
+        level: _Level | None = _Level(
+            primary_path(self.device, canvas, pixels, lane),
+            np.arange(count),
+            ["primary"] * count,
+            [1.0] * count,
+            [roots] * count,
+        )
+        while level is not None:
+            level = self._trace(level)
+        return roots
+
+    def _trace(self, level: _Level) -> _Level | None:
+        """Adds the nodes of a level, and gives the next one."""
+        device, backend, path = self.device, self.backend, level.paths
+        everything = dr.full(backend.Bool, True, len(level.kinds))
+        hit = closest_hit(device, path.ray, everything)
+        surface = surface_at(device, path.ray, hit, everything)
+        material = material_at(device, surface, hit.valid)
+        own = texture_color(
+            backend, device.textures, material.texture, texture_point(device, surface, hit.valid), hit.valid
+        )
+        base = path.throughput * own * device.not_ambient
+        children = spawn(device, path, surface, material, base, hit.valid)
+        dr.eval(hit, surface, material, own, children)
+        number = dr.full(backend.UInt32, self.pixel, len(level.kinds))
+        sub_ray = backend.UInt32(level.sub_rays)
+        lights = self.lights.terms(path, surface, material, hit.valid, number, sub_ray)
+        seen = _Columns(len(level.kinds), path, hit, surface, material, own, children)
+        nodes = [self._node(level, seen, i, lights[i]) for i in range(len(level.kinds))]
+        for home, node in zip(level.homes, nodes, strict=True):
+            home.append(node)
+        return self._next(level, nodes, children, seen)
+
+    def _node(self, level: _Level, seen: _Columns, i: int, lights: tuple[LightTerm, ...]) -> RayNode:
+        worth = seen.throughput[i] * self.share
+        node = RayNode(
+            kind=level.kinds[i],
+            level=int(seen.level[i]),
+            factor=level.factors[i],
+            weight=float(seen.weight[i]),
+            worth=triple(worth),
+            origin=triple(seen.o[i]),
+            direction=triple(seen.d[i]),
+            hit=None,
+        )
+        if not seen.valid[i]:
+            if node.level == 0 or self.scene.secondary_background:
+                node.ambient = triple(worth * self.background)
+            return node
+        hit = node.hit = self._hit_point(seen, i)
+        a, lit = self.scene.ambient, worth * hit.color
+        direct = (1 - a) * hit.absorption * lit
+        node.lights = lights
+        node.ambient = triple(a * lit)
+        node.diffuse = triple(hit.diffuse * direct * _sum(light.diffuse for light in lights))
+        node.specular = triple(hit.specular * direct * _sum(light.specular for light in lights))
+        node.ended = tuple(self._ended(node, seen, i))
+        return node
+
+    def _hit_point(self, seen: _Columns, i: int) -> HitPoint:
+        number = int(seen.shape[i])
+        shape = self.scene.shapes[number]
+        return HitPoint(
+            shape=number,
+            name=name_of(self.scene, number),
+            primitive=int(seen.primitive[i]) - int(self.device.host.first_primitive[number]),
+            t=float(seen.t[i]),
+            position=triple(seen.p[i]),
+            normal=triple(seen.normal[i]),
+            entering=bool(seen.entering[i]),
+            texture=inherited(self.scene, shape, "texture") or "",
+            color=triple(seen.own[i]),
+            absorption=float(seen.absorption[i]),
+            diffuse=float(seen.diffuse[i]),
+            specular=float(seen.specular[i]),
+        )
+
+    def _ended(self, node: RayNode, seen: _Columns, i: int) -> list[EndedRay]:
+        """The children with a share that are not traced."""
+        total = bool(seen.total[i])
+        ended = []
+        for kind, k, traced in (
+            ("reflected", seen.reflection[i], seen.reflects[i]),
+            ("refracted", seen.refraction[i], seen.refracts[i]),
+        ):
+            if k == 0 or traced:
+                continue
+            weight = node.weight * float(k)
+            if kind == "refracted" and total and not self.device.options.tir_reflects:
+                reason = "total reflection"
+            else:
+                reason = "cut off" if weight <= self.scene.cutoff - 1e-6 else "too deep"
+            ended.append(
+                EndedRay("total_reflection" if kind == "refracted" and total else kind, weight, reason)
+            )
+        return ended
+
+    def _next(self, level: _Level, nodes: list[RayNode], children: Any, seen: _Columns) -> _Level | None:
+        """The children that are traced, those of one ray side by side."""
+        rows = [
+            (i, is_mirrored)
+            for i in range(len(level.kinds))
+            for is_mirrored, traced in ((True, seen.reflects[i]), (False, seen.refracts[i]))
+            if traced
+        ]
+        if not rows:
+            return None
+        lanes = np.array([i for i, _ in rows])
+        mirrored = np.array([is_mirrored for _, is_mirrored in rows])
+        index = self.backend.UInt32(lanes)
+        first, second = (picked(path, index) for path in (children.reflected, children.refracted))
+        paths = dr.select(self.backend.Bool(mirrored), first, second)
+        dr.eval(paths)
+        second_kinds = ["total_reflection" if seen.total[i] else "refracted" for i in lanes]
+        return _Level(
+            paths,
+            level.sub_rays[lanes],
+            ["reflected" if one else other for one, other in zip(mirrored, second_kinds, strict=True)],
+            [float((seen.reflection if one else seen.refraction)[i]) for i, one in rows],
+            [nodes[i].children for i in lanes],
+        )
+
+
+class _Columns:
+    """What is known of the rays of a level, in host memory: (n,) or (n, 3), double precision where real."""
+
+    def __init__(
+        self,
+        count: int,
+        path: Any,
+        hit: Any,
+        surface: Surface,
+        material: MaterialRow,
+        own: Any,
+        children: Any,
+    ) -> None:
+        def column(values: Any) -> np.ndarray:
+            array = values.numpy()
+            array = array.T if array.ndim == 2 else array
+            array = np.broadcast_to(array, (count, *array.shape[1:]))
+            return array.astype(np.float64) if array.dtype.kind == "f" else array
+
+        self.o, self.d, self.throughput = column(path.o), column(path.d), column(path.throughput)
+        self.weight, self.level = column(path.weight), column(path.level)
+        self.t, self.primitive, self.valid = column(hit.t), column(hit.primitive), column(hit.valid)
+        self.shape, self.p, self.normal = column(surface.shape), column(surface.p), column(surface.normal)
+        self.entering = column(surface.entering)
+        self.own = column(own)
+        self.absorption, self.reflection = column(material.absorption), column(material.reflection)
+        self.refraction = column(material.refraction)
+        self.diffuse, self.specular = column(material.finish.diffuse), column(material.finish.specular)
+        self.reflects, self.refracts = column(children.reflects), column(children.refracts)
+        self.total = column(children.total)
+
+
+def _sum(terms: Any) -> np.ndarray:
+    return np.sum([np.zeros(3), *terms], axis=0)
