@@ -344,3 +344,28 @@ def test_no_space_for_the_output(repository: Path) -> None:
         )
     assert re.fullmatch("tracer: error: .*No space left on device\n", done.stderr)
     assert done.returncode == 2
+
+
+def test_one_pixel_under_the_lens(tracer: Run, tmp_path: Path) -> None:
+    """The last line is the color that a render writes; nothing is written."""
+    done = tracer("render", "small.toml", "--pixel", "8", "6", "--set", "ambient=0.3")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "primary ray, weight 1: ball, primitive 0, at distance" in done.stdout
+    assert "light 0 (point): visible; D (" in done.stdout
+    assert [file.name for file in tmp_path.iterdir()] == ["small.toml"]
+    shown = re.fullmatch(r"sum of 1 rays: \((.*)\)", done.stdout.splitlines()[-1])
+    assert shown is not None
+    tracer("render", "small.toml", "--set", "ambient=0.3", "-o", "a.npz")
+    color = np.load(tmp_path / "a.npz")["color"][6, 8]
+    assert np.allclose([float(number) for number in shown[1].split()], color, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("more", "message"), [(("-o", "a.png"), "leave out either"), (("--frames", "1:2"), "leave out --frames")]
+)
+def test_one_pixel_is_no_picture(tracer: Run, more: tuple[str, str], message: str) -> None:
+    assert_refused(tracer("render", "small.toml", "--pixel", "8", "6", *more), message)
+
+
+def test_a_pixel_outside_the_picture_is_refused(tracer: Run) -> None:
+    assert_refused(tracer("render", "small.toml", "--pixel", "16", "6"), "0 <= X < 16 and 0 <= Y < 12")
