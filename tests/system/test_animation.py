@@ -225,7 +225,9 @@ def test_ctrl_c_and_kill_lose_no_finished_frame(variables: dict[str, str], tmp_p
     whole, broken = tmp_path / "whole", tmp_path / "broken"
     whole.mkdir()
     broken.mkdir()
-    assert start(whole, variables, *LONG).wait() == 0
+    process = start(whole, variables, *LONG)
+    process.communicate()
+    assert process.returncode == 0
 
     process = start(broken, variables, *LONG, "--progress", "json")
     assert process.stderr is not None
@@ -262,7 +264,7 @@ def test_memory_does_not_grow_with_the_frames_and_kernels_are_compiled_once(trac
     for frames in ("10", "60"):
         done = tracer(
             *("turntable", "room", "--scale", "0.5", "--frames", frames, "-o", "t.npz", "--stats", "--quiet"),
-            *("--set", "animation=[{key='shapes.0.radius', times=[1, 60], values=[50, 60]}]"),
+            *("--set", "animation=[{key='shapes.4.radius', times=[1, 60], values=[50, 60]}]"),
         )
         assert done.returncode == 0, done.stderr
         assert re.search(r"compiled for the first frame, 0 after it", done.stdout), done.stdout
