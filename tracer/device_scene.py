@@ -27,6 +27,7 @@ from tracer.replay import NOT_IN_KERNELS
 from tracer.scene import Scene
 from tracer.shafts import Enclosure
 from tracer.shapes import Plane, ShapeRecord, Sphere
+from tracer.shapes.sphere import SphereSlot
 from tracer.shapes.sphere_table import SphereTable
 from tracer.shapes.triangles import PlacedMesh
 from tracer.textures.tables import PackedTexture, TextureTables
@@ -40,7 +41,7 @@ DOCUMENT_STACK = 20
 """Pending rays of a pixel at the document's cut-off, 0.05."""
 
 UNROLLED_SPHERES = 32
-"""Up to so many spheres stand in the kernel one by one; more are looped over."""
+"""Up to so many spheres stand in the kernel one by one; over more there is a hierarchy."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +103,11 @@ class DeviceScene:
     max_depth: Any
     stack_size: int
     host: HostScene = field(metadata=NOT_IN_KERNELS)
+
+    @property
+    def spheres(self) -> list[SphereSlot]:
+        """The spheres that stand in the kernel one by one."""
+        return [slot for slot in self.slots if isinstance(slot, SphereSlot)]
 
 
 _LAST: LastScenes[DeviceScene] = LastScenes(variants=2, megabytes=256)

@@ -20,7 +20,6 @@ from tracer.light_tables import (
     jitter_shift,
 )
 from tracer.occlusion import (
-    find_suspects,
     hidden,
     hidden_by_many,
     hidden_by_plane,
@@ -30,6 +29,7 @@ from tracer.occlusion import (
 from tracer.ray import Ray, max_abs
 from tracer.shafts import Ball, Suspects
 from tracer.shapes.plane import PlaneSlot
+from tracer.suspects import find_suspects
 
 
 def direct_light(

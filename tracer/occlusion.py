@@ -8,59 +8,12 @@ from typing import Any
 
 import drjit as dr
 
-from tracer.acceleration.beam import CLEAR, COVERED, look_along
 from tracer.acceleration.traverse import visit_triangles
 from tracer.device_scene import DeviceScene
 from tracer.intersection import Surface, departure_to_light, shape_of
 from tracer.ray import Segment
-from tracer.shafts import Ball, Shaft, Suspects
+from tracer.shafts import Suspects
 from tracer.shapes.plane import PlaneSlot
-from tracer.shapes.sphere import SphereSlot
-
-
-def find_suspects(
-    scene: DeviceScene, surface: Surface, ball: Ball, active: Any, *, spheres: bool, beams: bool
-) -> Suspects:
-    """Who may hide a light, whose samples the ball holds, from the points of a surface.
-
-    Without `spheres` only the others are looked at; without `beams` every mesh near the way is suspect. To
-    look along a beam pays where it stands for several shadow rays.
-    """
-    backend = scene.backend
-    who = Suspects.nobody(backend, dr.width(surface.p))
-    shaft = Shaft.of(backend, surface.p, ball)
-    for number, slot in enumerate(_spheres(scene) if spheres else []):
-        found = shaft.toward(slot.center, slot.radius)
-        # The sphere itself hides every light outside from a point inside it, and none that it faces outside.
-        own, inside = surface.primitive == slot.primitive, ~surface.entering
-        suspect = dr.select(own, inside, found.may_meet)
-        who.spheres |= dr.select(suspect, backend.UInt32(1 << number), 0)
-        who.umbra |= dr.select(own, inside & found.apart, found.covered)
-    if scene.sphere_table is not None:
-        around = scene.sphere_table.ball
-        who.many |= shaft.toward(around.center, around.radius).may_meet
-    if scene.triangles is not None:
-        near = active & _near_a_mesh(scene, surface, shaft)
-        if not scene.options.transparent_shadows:
-            near = near & ~who.umbra
-        if not beams:
-            who.meshes |= near
-            return who
-        verdict = look_along(backend, scene.triangles, shaft, surface.lit_side, surface.primitive, near)
-        who.meshes |= verdict != CLEAR
-        who.umbra |= verdict == COVERED
-    return who
-
-
-def _near_a_mesh(scene: DeviceScene, surface: Surface, shaft: Shaft) -> Any:
-    """Mask: the shaft may meet the ball around a mesh, and not just that of a convex mesh that it leaves."""
-    near = dr.zeros(scene.backend.Bool, dr.width(surface.p))
-    for mesh in scene.enclosures:
-        met = shaft.toward(mesh.ball.center, mesh.ball.radius).may_meet
-        if mesh.convex:
-            met = met & ~((surface.shape == mesh.shape) & surface.entering)
-        near |= met
-    return near
 
 
 def hidden(scene: DeviceScene, segment: Segment, surface: Surface, suspects: Suspects, active: Any) -> Any:
@@ -86,7 +39,7 @@ def hidden_by_sphere(
 ) -> Any:
     """Mask: a sphere that stands in the kernel (and is suspect) lies strictly between the two ends."""
     blocked = dr.full(scene.backend.Bool, False, dr.width(segment.length))
-    for number, slot in enumerate(_spheres(scene)):
+    for number, slot in enumerate(scene.spheres):
         if suspects is None:
             blocked = blocked | slot.blocks(segment, active)
         else:
@@ -121,10 +74,6 @@ def hidden_by_many(
     return blocked & active
 
 
-def _spheres(scene: DeviceScene) -> list[SphereSlot]:
-    return [slot for slot in scene.slots if isinstance(slot, SphereSlot)]
-
-
 def _changed_where(lanes: Any, value: Any, change: Callable[[Any], Any]) -> Any:
     """change(value) in some lanes; packets without one skip it."""
     (result,) = dr.if_stmt(
@@ -151,15 +100,12 @@ def transmittance(
     for slot in scene.slots:
         if isinstance(slot, PlaneSlot):
             share = passed(share, slot)
-    for number, slot in enumerate(_spheres(scene)):
+    for number, slot in enumerate(scene.spheres):
         asked = active & ((suspects.spheres & (1 << number)) != 0)
         share = _changed_where(asked, share, partial(passed, slot=slot))
     if scene.sphere_table is not None:
         share = scene.sphere_table.fold(
-            share,
-            active & suspects.many,
-            passed,
-            lambda share: share > 0,
+            segment, share, active & suspects.many, step=passed, done=lambda share: share == 0
         )
     if scene.triangles is not None:
         share = visit_triangles(

@@ -25,6 +25,7 @@ from tracer.ray import Ray, normalize
 from tracer.shafts import CONTACT_REACH, Ball, Shaft, Suspects
 from tracer.shapes import Mesh
 from tracer.shapes.triangles import MeshData, place_mesh
+from tracer.suspects import find_suspects
 
 Array = np.ndarray
 
@@ -192,17 +193,42 @@ class Lane:
     radius: Array
 
 
-def ask_triangles(scene: DeviceScene, stand: Stand, lights: Lights) -> BeamVerdicts:
-    backend, n = scene.backend, len(stand.p)
-    assert scene.triangles is not None
+def light_balls(scene: DeviceScene, lights: Lights) -> Ball:
+    """The balls that hold the lights, as the tables of a scene have them."""
     extent = np.abs(lights.c).max(axis=1) + lights.radius
-    held = lights.radius + CONTACT_REACH * backend.epsilon * extent
-    ball = Ball(vectors(backend, lights.c), numbers(backend, held))
-    surface, valid = stand.surface, backend.Bool(stand.valid)
-    shaft = Shaft.of(backend, surface.p, ball)
+    held = lights.radius + CONTACT_REACH * scene.backend.epsilon * extent
+    return Ball(vectors(scene.backend, lights.c), numbers(scene.backend, held))
+
+
+def ask_triangles(scene: DeviceScene, stand: Stand, lights: Lights) -> BeamVerdicts:
+    assert scene.triangles is not None
+    surface, valid = stand.surface, scene.backend.Bool(stand.valid)
+    shaft = Shaft.of(scene.backend, surface.p, light_balls(scene, lights))
     verdict = beam.look_along(
-        backend, scene.triangles, shaft, surface.lit_side, surface.primitive, valid
-    ).numpy()
+        scene.backend, scene.triangles, shaft, surface.lit_side, surface.primitive, valid
+    )
+    return beside_shadow_rays(scene, stand, lights, verdict.numpy())
+
+
+def ask_many_spheres(scene: DeviceScene, stand: Stand, lights: Lights) -> BeamVerdicts:
+    who = find_suspects(
+        scene,
+        stand.surface,
+        light_balls(scene, lights),
+        scene.backend.Bool(stand.valid),
+        spheres=True,
+        beams=True,
+    )
+    suspect, umbra = who.many.numpy(), who.umbra.numpy()
+    assert suspect[umbra].all()
+    verdict = np.where(umbra, beam.COVERED, np.where(suspect, beam.DOUBTFUL, beam.CLEAR))
+    return beside_shadow_rays(scene, stand, lights, verdict)
+
+
+def beside_shadow_rays(scene: DeviceScene, stand: Stand, lights: Lights, verdict: Array) -> BeamVerdicts:
+    """Verdicts (n,) together with what shadow rays to all points of the lights say."""
+    backend, n = scene.backend, len(stand.p)
+    surface, valid = stand.surface, backend.Bool(stand.valid)
     some, every, any_lit = np.zeros(n, bool), np.ones(n, bool), np.zeros(n, bool)
     nowhere = dr.zeros(backend.UInt32, n)
     for light in lights.points:
@@ -227,10 +253,32 @@ def check_triangles(
     with exact_arithmetic():
         stand = stand_on(scene, targets, rng)
         found = ask_triangles(scene, stand, lights_around(stand, chosen, rng, k))
+    report_wrong(found)
+    assert stand.valid.mean() > 0.7 and found.lit.mean() > 0.2
+    return found
+
+
+def report_wrong(found: BeamVerdicts) -> None:
     report("clear, yet a shadow ray is blocked", (found.verdict == beam.CLEAR) & found.some, found.lanes)
     covered = found.verdict == beam.COVERED
     report("covered, yet a shadow ray passes", covered & found.lit & ~found.every, found.lanes)
-    assert stand.valid.mean() > 0.7 and found.lit.mean() > 0.2
+
+
+def check_many_spheres(precision: str, n: int, seed: int, count: int = 60) -> BeamVerdicts:
+    """Spheres of all sizes, some of them around others; lights seen through them."""
+    rng = np.random.default_rng(seed)
+    center, radius = rng.uniform(-2, 2, (count, 3)), 0.8 * log_uniform(rng, -1.5, 0, count)
+    shapes = [
+        {"kind": "sphere", "center": c.tolist(), "radius": r}
+        for c, r in zip(center, radius.tolist(), strict=True)
+    ]
+    scene = compiled({"shapes": shapes}, precision)
+    number = rng.integers(count, size=n)
+    corners = center[number, None] + radius[number, None, None] * unit(rng.normal(size=(n, 3, 3)))
+    with exact_arithmetic():
+        stand = stand_on(scene, corners[:, 0], rng)
+        found = ask_many_spheres(scene, stand, lights_around(stand, corners, rng, 3))
+    report_wrong(found)
     return found
 
 

@@ -12,9 +12,10 @@ import tracer
 from tracer.backends import INVALID, exact_arithmetic, find_backend
 from tracer.device_scene import DeviceScene, compile_scene
 from tracer.intersection import closest_hit, free_ray, leave, surface_at
-from tracer.occlusion import find_suspects, hidden
+from tracer.occlusion import hidden
 from tracer.ray import Segment, max_abs, normalize
 from tracer.shafts import Ball, Suspects
+from tracer.suspects import find_suspects
 
 Array = np.ndarray
 

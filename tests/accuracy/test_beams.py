@@ -1,4 +1,4 @@
-"""What spares shadow rays is right about triangles: each verdict on a whole light against the shadow rays."""
+"""What spares shadow rays is right about hierarchies: each verdict on a light against the shadow rays."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import pytest
 from tests.accuracy.beams import (
     ask_triangles,
     check_lone,
+    check_many_spheres,
     check_triangles,
     inside_of,
     lights_around,
@@ -38,6 +39,21 @@ def test_a_light_behind_triangles(precision: str) -> None:
     assert found.some.mean() > 0.1
     assert (found.verdict == beam.CLEAR)[found.lit & ~found.some].mean() > 0.3
     assert (found.verdict == beam.COVERED)[found.lit & found.every].mean() > 0.2
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_a_light_behind_many_spheres(precision: str) -> None:
+    found = check_many_spheres(precision, 10_000, 1)
+    assert 0.1 < found.some.mean() < 0.9
+    assert (found.verdict == beam.CLEAR)[found.lit & ~found.some].mean() > 0.3
+    assert (found.verdict == beam.COVERED)[found.lit & found.every].mean() > 0.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_many_lights_behind_many_spheres(precision: str) -> None:
+    for seed in range(2, 8):
+        check_many_spheres(precision, 50_000, seed, count=40 * seed)
 
 
 @pytest.mark.slow

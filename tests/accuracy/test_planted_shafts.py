@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 from tests.accuracy import test_shafts
-from tests.accuracy.beams import check_lone, check_triangles, soup
+from tests.accuracy.beams import check_lone, check_many_spheres, check_triangles, soup
 from tests.accuracy.shafts import check_inside, check_spheres, random_balls, tangent_balls
-from tracer import light_tables
+from tracer import light_tables, suspects
 from tracer.acceleration import beam
 from tracer.backends import Backend
 from tracer.shafts import Ball, Shaft, ball_around
@@ -92,6 +92,16 @@ def soup_check() -> None:
     check_triangles(soup, "single", 10_000, 1)
 
 
+def many_check() -> None:
+    check_many_spheres("single", 10_000, 1)
+
+
+def own_sphere_forgotten(patch: pytest.MonkeyPatch) -> None:
+    rewrite(
+        patch, suspects, "_meet_sphere", "dr.select(own, inside, found.may_meet)", "~own & found.may_meet"
+    )
+
+
 def ball_check() -> None:
     test_shafts.test_a_light_lies_in_its_ball("ring", False)
 
@@ -109,6 +119,8 @@ def ball_check() -> None:
         (faces_not_turned, soup_check),
         (faces_turned_by_noise, sliver_check),
         (slabs_for_a_ray, soup_check),
+        (slabs_for_a_ray, many_check),
+        (own_sphere_forgotten, many_check),
         (ball_of_the_light_too_small, ball_check),
     ],
 )

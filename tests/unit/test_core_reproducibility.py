@@ -103,6 +103,27 @@ def test_a_change_of_numbers_compiles_nothing(path: str) -> None:
     assert not new, f"{path}: {len(new)} new kernels"
 
 
+def many_spheres(count: int, seed: int = 3) -> dict[str, Any]:
+    """A room with so many spheres, wherever a seed puts them."""
+    rng = np.random.default_rng(seed)
+    balls = [
+        {"kind": "sphere", "center": center.tolist(), "radius": 0.1}
+        for center in rng.uniform((-4, 0, -4), (4, 5, 4), (count, 3))
+    ]
+    return worlds.room(shapes=[*worlds.room()["shapes"], *balls])
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_of_many_spheres_one_more_or_elsewhere_compiles_nothing(precision: str) -> None:
+    known = {entry["hash"] for entry in kernels_of(many_spheres(40), precision=precision)}
+    for table in (many_spheres(41), many_spheres(100), many_spheres(40, seed=4)):
+        kernels = [
+            entry for entry in kernels_of(table, precision=precision) if entry["operation_count"] >= UPLOAD
+        ]
+        assert kernels
+        assert not {entry["hash"] for entry in kernels} - known
+
+
 def test_a_change_of_structure_is_seen_by_the_check_above() -> None:
     known = {entry["hash"] for entry in kernels_of(worlds.room())}
     assert {entry["hash"] for entry in kernels_of(worlds.room(transparent_shadows=True))} - known

@@ -1,9 +1,10 @@
-"""A whole light against the triangles: one walk that most often spares a shadow ray for each of its samples.
+"""A whole light against a hierarchy: one walk that most often spares a shadow ray for each of its samples.
 
 The ways from a point to all samples of a light lie in a cone, its shaft (`tracer/shafts.py`). The walk looks
 for triangles that the shaft may touch. A triangle is out of it when the point and the light's ball lie on
 one side of its plane, or when the ball lies beyond one of the planes through the point and an edge. When the
-ball lies inside all three of these and behind the triangle, the triangle hides the light as a whole.
+ball lies inside all three of these and behind the triangle, the triangle hides the light as a whole. Among
+many spheres the same walk asks each what `shafts.py` asks of one.
 
 Every test is wide by more than the rounding and the contact rules of the rays that it stands for
 (`triangle.py`, `departure.py`), so no answer differs from theirs.
@@ -11,6 +12,7 @@ Every test is wide by more than the rounding and the contact rules of the rays t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,21 +40,30 @@ def look_along(
 
     `normal`: unit normal (3, n) on the lit side of the surface at the shafts' apex; `primitive`: its id.
     """
-    slabs = _Slabs.of(backend, tables.lists, shaft)
-    root = fetch_node(backend, tables.lists, slabs.octant * tables.lists.count)
+
+    def meet(slot: Any) -> Any:
+        triangle, number = fetch_triangle(backend, tables.rows, slot)
+        return dr.select(number != primitive, _meet(backend, triangle, shaft, normal), CLEAR)
+
+    return first_verdict(backend, tables.lists, shaft, meet, active)
+
+
+def first_verdict(
+    backend: Backend, lists: NodeLists, shaft: Shaft, meet: Callable[[Any], Any], active: Any
+) -> Any:
+    """The first verdict (n,) of `meet(slot)` on what lies in the boxes that a shaft may cross that is not
+    `CLEAR`."""
+    slabs = _Slabs.of(backend, lists, shaft)
+    root = fetch_node(backend, lists, slabs.octant * lists.count)
 
     def look(verdict: Any) -> tuple[Any]:
-        def test(slot: Any, verdict: Any) -> Any:
-            triangle, number = fetch_triangle(backend, tables.rows, slot)
-            return dr.select(number != primitive, _meet(backend, triangle, shaft, normal), verdict)
-
         return (
             walk(
                 backend,
-                tables.lists,
+                lists,
                 slabs.octant,
                 crosses=lambda node, verdict: slabs.crossed(node),
-                test=test,
+                test=lambda slot, verdict: meet(slot),
                 state=verdict,
                 done=lambda verdict: verdict != CLEAR,
             ),

@@ -1,11 +1,12 @@
-"""Builds the bounding volume hierarchy over all triangles, by the surface area heuristic.
+"""Builds a bounding volume hierarchy, over all triangles or many spheres, by the surface area heuristic.
 
-Top down: the centroids of a node's triangles fall into 16 bins on each axis, and the node is cut between the
+Top down: the centroids of a node's boxes fall into 16 bins on each axis, and the node is cut between the
 two bins where the expected cost is least (Wald, On Fast Construction of SAH-based Bounding Volume
-Hierarchies, 2007). Large nodes are cut a level at a time, with a lane for every chunk of triangles
+Hierarchies, 2007). Large nodes are cut a level at a time, with a lane for every chunk of boxes
 (`bins.py`); small ones down to the leaves, with a lane for each (`subtrees.py`). The kernels only decide
-which triangles go where; boxes are made of the corners themselves, so that they are exact on every backend.
-The root is the bounding box of the document's section 5.
+which box goes where; those of nodes are made of the given ones, so that they are exact on every backend. What
+lies in the boxes plays no part: where these rooms speak of triangles, spheres are as good. Over triangles the
+root is the bounding box of the document's section 5.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ class Hierarchy:
     """A binary tree of n nodes, level by level, the root first.
 
     `lower`, `upper` (n, 3) float32: boxes; `left` (n,): left child, the right one follows it, 0 for a leaf;
-    `first`, `count` (n,): the triangles below a node are `order[first : first + count]`; `levels`: where each
+    `first`, `count` (n,): what lies below a node is `order[first : first + count]`; `levels`: where each
     level of nodes ends.
     """
 
@@ -45,10 +46,14 @@ def build_hierarchy(backend: Backend, corners: np.ndarray) -> Hierarchy:
     Degenerate triangles may be among them: the triangle test never accepts them.
     """
     a, b, c = (corners[:, k].astype(np.float32) for k in range(3))
-    lower, upper = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    return build_over_boxes(backend, np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c))
+
+
+def build_over_boxes(backend: Backend, lower: np.ndarray, upper: np.ndarray) -> Hierarchy:
+    """The hierarchy of whatever lies in n >= 1 boxes `lower`, `upper` (n, 3) float32."""
     with exact_arithmetic():
         table = backend.single_table(_box_rows(lower, upper))
-        table, top, first, count = cut_large_nodes(backend, table, len(corners))
+        table, top, first, count = cut_large_nodes(backend, table, len(lower))
         found = build_subtrees(backend, table, backend.id_table(first), backend.id_table(count))
         left, leaf, slots = (x.numpy().astype(np.int64) for x in found)
     numbers = table.numpy().view(np.uint32).reshape(-1, BOX_WORDS)[:, 6]

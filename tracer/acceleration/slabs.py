@@ -39,8 +39,8 @@ class Slabs:
     width: Any
 
     @staticmethod
-    def of(backend: Backend, lists: NodeLists, ray: Ray) -> Slabs:
-        """For n rays."""
+    def of(backend: Backend, lists: NodeLists, ray: Ray, widening: float = WIDTH) -> Slabs:
+        """For n rays; `widening`: of boxes, in eps of the largest coordinate in play."""
         tiny = backend.Float(SMALLEST_COMPONENT)
         d = backend.Vector3(*(dr.select(dr.abs(c) < tiny, dr.select(c < 0, -tiny, tiny), c) for c in ray.d))
         inverse = dr.rcp(d)
@@ -50,7 +50,7 @@ class Slabs:
             rate, start = lists.grid.step * inverse, lists.grid.low - ray.o
         shift = start * inverse
         return Slabs(
-            octant_of(backend, d), inverse, rate, shift - WIDTH * width, shift + WIDTH * width, width
+            octant_of(backend, d), inverse, rate, shift - widening * width, shift + widening * width, width
         )
 
     def crossed(self, node: Node, limit: Any) -> Any:

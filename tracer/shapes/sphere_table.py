@@ -1,4 +1,4 @@
-"""Many spheres: a loop over a table, where unrolled code would grow with every sphere."""
+"""Many spheres: a hierarchy over them, where unrolled code would grow with every sphere."""
 
 from __future__ import annotations
 
@@ -9,73 +9,136 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
+from tracer.acceleration.build import build_over_boxes
+from tracer.acceleration.layout import NodeLists, threaded
+from tracer.acceleration.slabs import Slabs
+from tracer.acceleration.walk import fetch_node, walk
 from tracer.backends import Backend
 from tracer.ray import Hit, Ray, Segment
 from tracer.shafts import Ball, ball_around
 from tracer.shapes.sphere import SphereSlot, contact_margin
 
+WIDTH = 64
+"""Boxes are widened by this many eps of the largest coordinate in play. A hit may lie 34 outside of its
+sphere: a ray that leaves it starts within 8, and the distance to the closest approach, which rounds by 13,
+counts twice on the way to the other side. The planes of a box round by 11."""
+
 
 @dataclass
 class SphereTable:
-    """`rows`: 4 floats a sphere (center, radius); `margins`, `primitives`: one each; `count`: width-1; `ball`
-    holds them all."""
+    """All spheres of a scene in Dr.Jit memory, in the order of the leaves: `rows`, 4 floats each (center,
+    radius), `margins` and `primitives`, one each; `lists`: the hierarchy over them; `ball`: holds all."""
 
     backend: Backend
     rows: Any
     margins: Any
     primitives: Any
-    count: Any
+    lists: NodeLists
     ball: Ball
 
     @staticmethod
     def of(backend: Backend, rows: np.ndarray, primitives: np.ndarray) -> SphereTable:
-        """The table of n spheres with `rows` (n, 4) and their primitive ids."""
+        """The table of n >= 1 spheres with `rows` (n, 4) and their primitive ids."""
+        lower, upper = sphere_boxes(rows.astype(backend.dtype))
+        tree = build_over_boxes(backend, lower, upper)
+        rows, primitives = rows[tree.order], primitives[tree.order]
         return SphereTable(
-            backend,
-            backend.table(rows),
-            backend.table([contact_margin(row, backend.epsilon) for row in rows]),
-            backend.id_table(primitives),
-            backend.opaque_id(len(rows)),
-            Ball.of(backend, ball_around(_extremes(rows), backend.epsilon)),
+            backend=backend,
+            rows=backend.table(rows),
+            margins=backend.table([contact_margin(row, backend.epsilon) for row in rows]),
+            primitives=backend.id_table(primitives),
+            lists=threaded(backend, tree),
+            ball=Ball.of(backend, ball_around(_corners(lower, upper), backend.epsilon)),
         )
 
     def closest(self, ray: Ray, hit: Hit, active: Any) -> Hit:
         """The nearest of `hit` and all spheres."""
-        return self.fold(hit, active, lambda hit, sphere: sphere.closest(ray, hit, active), lambda hit: True)
+        return self._visit(
+            ray,
+            limit=lambda hit: hit.t,
+            state=hit,
+            active=active,
+            step=lambda hit, sphere: sphere.closest(ray, hit, active),
+        )
 
     def blocks(self, segment: Segment, active: Any) -> Any:
         """Mask: a sphere lies strictly between the two ends."""
-        start = dr.full(self.backend.Bool, False, dr.width(segment.length))
         return self.fold(
-            start, active, lambda blocked, s: blocked | s.blocks(segment, active), lambda blocked: ~blocked
+            segment,
+            state=dr.full(self.backend.Bool, False, dr.width(segment.length)),
+            active=active,
+            step=lambda blocked, sphere: blocked | sphere.blocks(segment, active),
+            done=lambda blocked: blocked,
         )
 
-    def fold(self, state: Any, active: Any, step: Callable[..., Any], unfinished: Callable[..., Any]) -> Any:
-        """step(... step(step(state, sphere 0), sphere 1) ...), ended early where `unfinished` says no."""
+    def fold(
+        self,
+        segment: Segment,
+        state: Any,
+        active: Any,
+        step: Callable[[Any, SphereSlot], Any],
+        done: Callable[[Any], Any],
+    ) -> Any:
+        """step(... step(step(state, sphere), sphere) ...) over all spheres that may lie between the two ends,
+        in any order, until `done(state)` says so."""
+        return self._visit(segment.ray, lambda state: segment.length, state, active, step, done)
 
-        def body(i: Any, state: Any) -> tuple[Any, Any]:
-            return i + 1, step(state, self._slot(i))
+    def _visit(
+        self,
+        ray: Ray,
+        limit: Callable[[Any], Any],
+        state: Any,
+        active: Any,
+        step: Callable[[Any, SphereSlot], Any],
+        done: Callable[[Any], Any] | None = None,
+    ) -> Any:
+        """Steps through the spheres whose boxes a ray meets up to `limit(state)`, nearest boxes first."""
+        backend, lists = self.backend, self.lists
+        slabs = Slabs.of(backend, lists, ray, WIDTH)
+        root = fetch_node(backend, lists, slabs.octant * lists.count)
 
-        index = dr.select(active, dr.zeros(self.backend.UInt32, dr.width(active)), self.count)
-        _, state = dr.while_loop(
-            state=(index, state),
-            cond=lambda i, state: (i < self.count) & unfinished(state),
-            body=body,
+        def visit_all(state: Any) -> tuple[Any]:
+            return (
+                walk(
+                    backend,
+                    lists,
+                    slabs.octant,
+                    crosses=lambda node, state: slabs.crossed(node, limit(state)),
+                    test=lambda slot, state: step(state, self.fetch(slot)),
+                    state=state,
+                    done=done,
+                ),
+            )
+
+        (state,) = dr.if_stmt(
+            args=(state,),
+            cond=active & slabs.crossed(root, limit(state)),
+            true_fn=visit_all,
+            false_fn=lambda state: (state,),
             label="spheres",
         )
         return state
 
-    def _slot(self, i: Any) -> SphereSlot:
-        row = dr.gather(self.backend.Vector4, self.rows, i)
+    def fetch(self, slot: Any) -> SphereSlot:
+        """The sphere in a slot of the hierarchy."""
+        row = dr.gather(self.backend.Vector4, self.rows, slot)
         return SphereSlot(
             center=self.backend.Vector3(row.x, row.y, row.z),
             radius=row.w,
-            margin=dr.gather(self.backend.Float, self.margins, i),
-            primitive=dr.gather(self.backend.UInt32, self.primitives, i),
+            margin=dr.gather(self.backend.Float, self.margins, slot),
+            primitive=dr.gather(self.backend.UInt32, self.primitives, slot),
         )
 
 
-def _extremes(rows: np.ndarray) -> np.ndarray:
-    """(8 n, 3) the corners of the boxes around spheres."""
-    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    return (rows[:, None, :3] + rows[:, None, 3:] * corners).reshape(-1, 3)
+def sphere_boxes(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Boxes `lower`, `upper` (n, 3) around spheres with `rows` (n, 4), in single precision numbers, rounded
+    outwards."""
+    center, radius = rows[:, :3].astype(np.float64), rows[:, 3:].astype(np.float64)
+    lower, upper = (center - radius).astype(np.float32), (center + radius).astype(np.float32)
+    return np.nextafter(lower, np.float32(-np.inf)), np.nextafter(upper, np.float32(np.inf))
+
+
+def _corners(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """(8 n, 3) the corners of boxes, in double precision."""
+    chosen = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], bool)
+    return np.where(chosen, upper[:, None], lower[:, None]).astype(np.float64).reshape(-1, 3)
