@@ -72,7 +72,7 @@ def test_a_light_lies_in_its_ball(kind: str, jitter: bool) -> None:
     i = backend.UInt32(rng.integers(8, size=n).astype(np.uint32))
     shift = backend.Vector2(*(numbers(backend, s) for s in np.round(rng.random((2, n)), 2)))
     nowhere = dr.zeros(backend.UInt32, n)
-    sample, _ = fetch_sample(backend, lights, i, shift, lambda p: (nowhere, nowhere))
+    sample, _, _ = fetch_sample(backend, lights, i, shift, lambda p: (nowhere, nowhere))
     ball = fetch_ball(backend, lights, dr.gather(backend.UInt32, lights.lights, i))
     away = np.linalg.norm((sample.position - ball.center).numpy().astype(np.float64), axis=0)
     assert (away <= ball.radius.numpy()).all()
