@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields
 from functools import partial
 from typing import Any
@@ -22,7 +22,9 @@ from tracer.film.depth_of_field import depth_of_field, rectangle_needed
 from tracer.film.film import Film
 from tracer.film.layout import VISIBILITY
 from tracer.film.result import Result
+from tracer.film.work_file import WorkFile
 from tracer.first_hits import first_triangles
+from tracer.kept_bands import KeptBands, identity_of
 from tracer.pixels import BandPlace, pixels_of
 from tracer.replay import Program
 from tracer.scene import Scene
@@ -35,11 +37,11 @@ from tracer.whitted import Counts, trace_pixels
 COUNTERS = tuple(f.name for f in fields(Counts))
 
 Progress = Callable[[int, int, int], None]
-"""(finished pixels, all pixels, rays so far), called after every band."""
+"""(finished pixels, all pixels, rays traced by this run), called at first and after every band."""
 
 
 class RenderInterrupted(KeyboardInterrupt):
-    """Ctrl-C during a render; `partial` holds the rows that were finished, the rest is blank."""
+    """Ctrl-C during a render; `partial` holds the bands that were finished, the rest is blank."""
 
     def __init__(self, partial: Result) -> None:
         super().__init__("interrupted")
@@ -60,6 +62,7 @@ def render(
     seed: int | None = None,
     rays_per_band: int = RAYS_PER_BAND,
     progress: Progress | None = None,
+    work: WorkFile | None = None,
 ) -> Result:
     """Renders a scene.
 
@@ -75,28 +78,38 @@ def render(
         threads: CPU threads (LLVM); None: all cores.
         seed: of jitter and depth of field; None: as the scene says.
         rays_per_band: primary rays of one launch; no picture depends on it.
-        progress: called after every launch with (finished pixels, all pixels, rays so far).
+        progress: called at first and after every launch with (finished pixels, all pixels, rays of this run).
+        work: where finished bands are kept, and found again after an interruption; the caller removes it
+            when the result is saved. Pictures of less than a second keep nothing.
 
     Returns: `color` (h, w, 3) float32 (float64 in double precision), display-referred and not clamped;
         `depth` (h, w), distance from the canvas along the ray, -1 blank; `alpha`, `z`, `aovs`, `stats`.
 
     Raises: `UsageError` and `SceneError` for bad input, `MachineError` when the machine lacks the backend,
-        `RenderInterrupted` on Ctrl-C.
+        `OutputError` when the work file cannot be written, `RenderInterrupted` on Ctrl-C.
     """
     settings = Settings(
         precision, backend, supersample, aovs, scale, resolution, crop, threads, seed, rays_per_band
     ).checked()
     types = find_backend(settings.backend, settings.precision)
     with exact_arithmetic(), thread_count(settings.threads):
-        return _Job(with_seed(scene, settings.seed), settings, types, progress).run()
+        return _Job(with_seed(scene, settings.seed), settings, types, progress, work).run()
 
 
 class _Job:
     """One render under way."""
 
-    def __init__(self, scene: Scene, settings: Settings, backend: Backend, progress: Progress | None) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        settings: Settings,
+        backend: Backend,
+        progress: Progress | None,
+        work: WorkFile | None,
+    ) -> None:
         started = time.perf_counter()
         self.scene, self.settings, self.backend, self.progress = scene, settings, backend, progress
+        self.work = work
         self.canvas = picture_canvas(scene, settings)
         self.rectangle = picture_rectangle(settings.crop, self.canvas)
         self.n = settings.supersample or scene.camera.supersample
@@ -118,17 +131,32 @@ class _Job:
         """The first pass over a rectangle, band by band."""
         film = Film(rectangle, self.backend.dtype, dict.fromkeys(("primary", *COUNTERS), 0))
         started = time.perf_counter()
-        x0, y0, x1, y1 = rectangle
-        pixels = (x1 - x0) * (y1 - y0)
-        try:
-            for band in bands(rectangle, self.n**2, self.settings.rays_per_band):
-                self._trace_band(film, band)
-                if self.progress is not None:
-                    self.progress((band.y1 - y0) * band.width, pixels, _ray_count(film.counts))
-        except KeyboardInterrupt:
-            raise RenderInterrupted(self._result(film)) from None
-        self.seconds["trace"] += time.perf_counter() - started
+        with KeptBands(self.work, film, self._identity) as kept:
+            remaining = kept.restore()
+            earlier = _ray_count(film.counts)
+            try:
+                self._report(film, earlier)
+                for band in (band for rest in remaining for band in self._bands(rest)):
+                    self._trace_band(film, band)
+                    kept.finished(band)
+                    self._report(film, earlier)
+            except KeyboardInterrupt:
+                kept.finish()
+                raise RenderInterrupted(self._result(film)) from None
+        self.seconds["trace"] += kept.seconds + time.perf_counter() - started
         return film
+
+    def _bands(self, rectangle: Rectangle) -> Iterator[Band]:
+        return bands(rectangle, self.n**2, self.settings.rays_per_band)
+
+    def _report(self, film: Film, earlier: int) -> None:
+        if self.progress is not None:
+            x0, y0, x1, y1 = film.rectangle
+            self.progress(film.finished, (x1 - x0) * (y1 - y0), _ray_count(film.counts) - earlier)
+
+    def _identity(self) -> dict[str, Any]:
+        """What a work file must agree in."""
+        return identity_of(self.scene, self.canvas, self.rectangle, self.backend, self.n, self.layers)
 
     def _trace_band(self, film: Film, band: Band) -> None:
         backend = self.backend

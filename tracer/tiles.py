@@ -1,7 +1,8 @@
 """Which lane owns which pixel: 8x8 tiles in Morton order, row of tiles by row of tiles.
 
-Neighboring lanes then trace neighboring rays. A picture is launched in bands of whole tile rows; no band
-decides anything about a pixel, so every band height gives the same picture.
+Neighboring lanes then trace neighboring rays. A picture is launched in bands of whole tile rows, or in pieces
+of a tile row where a whole one is too much at once; no band decides anything about a pixel, so every size of
+them gives the same picture.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ Rectangle = tuple[int, int, int, int]
 
 @dataclass(frozen=True)
 class Band:
-    """Rows y0 .. y1 - 1 of a rectangle of the picture."""
+    """The pixels of one launch: columns x0 .. x1 - 1 and rows y0 .. y1 - 1 of the picture."""
 
     x0: int
     y0: int
@@ -42,13 +43,28 @@ class Band:
 
 
 def bands(rectangle: Rectangle, sub_rays: int, rays_per_band: int) -> Iterator[Band]:
-    """Cuts a rectangle into bands of whole tile rows with about so many primary rays each, one tile row at
-    least."""
+    """Cuts a rectangle into bands of at most so many primary rays, from left to right and from the top down.
+
+    Bands are whole tile rows; where not even one may be launched at once they are pieces of it, two tiles
+    wide at least. So there are no more than four sizes, each of which is a recording of its own.
+    """
     x0, y0, x1, y1 = rectangle
-    rays_per_tile_row = _tiles_across(x1 - x0) * _PIXELS * sub_rays
-    height = max(1, rays_per_band // rays_per_tile_row) * TILE
+    tiles = max(2, rays_per_band // (_PIXELS * sub_rays))
+    rows, columns = tiles // _tiles_across(x1 - x0), tiles
+    width, height = (x1 - x0, rows * TILE) if rows > 0 else (columns * TILE, TILE)
     for top in range(y0, y1, height):
-        yield Band(x0, top, x1, min(top + height, y1))
+        for left in range(x0, x1, width):
+            yield Band(left, top, min(left + width, x1), min(top + height, y1))
+
+
+def after(rectangle: Rectangle, band: Band) -> list[Rectangle]:
+    """What is left of a rectangle after this band and those before it: the rest of its rows, the rows below.
+
+    They are cut by `bands` as the rectangle was, or, with another number of rays, otherwise.
+    """
+    x0, _, x1, y1 = rectangle
+    rest = [(band.x1, band.y0, x1, band.y1), (x0, band.y1, x1, y1)]
+    return [(left, top, right, bottom) for left, top, right, bottom in rest if left < right and top < bottom]
 
 
 def _tiles_across(width: int) -> int:

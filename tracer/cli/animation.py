@@ -33,12 +33,10 @@ from tracer.version import __version__
 
 @dataclass(frozen=True)
 class Course:
-    """Which `frames` are rendered, at how many frames a second their movie plays (`rate`), and whether what
-    is finished already is kept (`resume`)."""
+    """Which `frames` are rendered, and at how many frames a second their movie plays (`rate`)."""
 
     frames: range
     rate: float
-    resume: bool
 
 
 @dataclass(frozen=True)
@@ -114,7 +112,7 @@ class _Animation:
         frames, files = self._course.frames, self._job.files
         for warning in warnings_of(self._job.scene):
             warn(warning, self._wishes)
-        self._record.start(self._course.resume)
+        self._record.start(self._wishes.resume)
         missing = [frame for frame in frames if not self._record.is_done(frame, files.of(frame))]
         finished = self._render(missing) + len(frames) - len(missing)
         if finished < len(frames):

@@ -31,10 +31,7 @@ def scene_options(command: Command) -> Command:
 
 
 def animation_options(command: Command) -> Command:
-    """`--fps` and `--resume`: how an animation is rendered."""
-    command = click.option(
-        "--resume", is_flag=True, help="Keep the frames that an earlier run of the same command finished."
-    )(command)
+    """`--fps`: how an animation is rendered."""
     return click.option(
         "--fps",
         type=click.FloatRange(0.1, 1000),
@@ -130,6 +127,9 @@ _PICTURE_OPTIONS = (
     click.option(
         "--seed", type=click.IntRange(0, 2**63 - 1), metavar="N", help="Seed of jitter and depth of field."
     ),
+    click.option(
+        "--resume", is_flag=True, help="Go on with what an earlier run of the same command finished."
+    ),
     click.option("--stats", is_flag=True, help="Tell where the time went, rays by kind, kernels, memory."),
     click.option("--quiet", is_flag=True, help="Print nothing but errors (and what --stats asks for)."),
     click.option(
@@ -137,6 +137,6 @@ _PICTURE_OPTIONS = (
         type=click.Choice(KINDS),
         default="auto",
         show_default=True,
-        help="On stderr; auto: bar on a terminal.",
+        help="On stderr; auto: bar on a terminal; json: an object a line.",
     ),
 )

@@ -13,10 +13,12 @@ import click
 from tracer.backends import find_backend
 from tracer.cli.failures import report, talk
 from tracer.cli.interruption import Interruption
-from tracer.cli.plan import Job, make_plan, partial_file
+from tracer.cli.plan import Job, make_plan, partial_file, work_file
 from tracer.cli.progress import make_reporter
 from tracer.cli.statistics import KernelRecord, format_statistics, seconds_since_start
+from tracer.errors import OutputError
 from tracer.film.result import Result
+from tracer.film.work_file import WorkFile
 from tracer.render import RenderInterrupted, render
 from tracer.scene import Scene, load
 from tracer.scene_warnings import warnings_of
@@ -41,6 +43,7 @@ class Wishes:
     alpha: bool
     half: bool
     seed: int | None
+    resume: bool
     stats: bool
     quiet: bool
     progress: str
@@ -101,45 +104,66 @@ class _Picture:
     def __init__(self, job: Job, wishes: Wishes, interruption: Interruption, imported: float) -> None:
         self._job, self._wishes, self._interruption = job, wishes, interruption
         self._seconds = {"imports": imported, "load": job.load_seconds}
-        self._pixels_done = 0
+        self._percent = 0
+        self._work = WorkFile(work_file(job.files[0]), wishes.resume)
 
     def make(self) -> int:
         """Traces and saves; returns the exit code."""
         started = time.perf_counter()
         for warning in warnings_of(self._job.scene):
             warn(warning, self._wishes)
+        self._tell_of_earlier_work()
         self._seconds["load"] += time.perf_counter() - started
         kernels = KernelRecord(self._wishes.stats)
         try:
             with kernels:
                 result = self._trace()
+            writing = time.perf_counter()
+            self._save(result)
         except RenderInterrupted as interrupted:
             self._save_partial(interrupted.partial)
             return self._interruption.exit_code
-        writing = time.perf_counter()
-        for file in self._job.files:
-            result.save(file, **self._wishes.file_options)
+        except OutputError as error:
+            raise OutputError(f"{error}{self._how_to_go_on()}") from error
+        finally:
+            self._work.close()
         self._seconds |= _phases(result) | {"write": time.perf_counter() - writing}
         self._tell(result, kernels, self._job.load_seconds + time.perf_counter() - started)
         return 0
+
+    def _tell_of_earlier_work(self) -> None:
+        if self._work.exists() != self._wishes.resume and not self._wishes.quiet:
+            talk(
+                f"{self._work.path}: there is no such file to resume, so {self._job.source} begins anew"
+                if self._wishes.resume
+                else f"{self._work.path}: is left of a run that was stopped; without --resume it is dropped"
+            )
 
     def _trace(self) -> Result:
         """The picture; `RenderInterrupted` also where the user's wish to stop came after the last ray."""
         reporter = make_reporter(self._wishes.reporter, self._job.scene.name)
 
         def progress(done: int, total: int, rays: int) -> None:
-            self._pixels_done = done
+            self._percent = 100 * done // total
             reporter.update(done, total, rays)
             self._interruption.check()
 
         try:
             with self._interruption.deferred():
-                result = render(self._job.scene, progress=progress, **self._wishes.settings)
+                result = render(self._job.scene, progress=progress, work=self._work, **self._wishes.settings)
                 if self._interruption.requested:
                     raise RenderInterrupted(result)
         finally:
             reporter.close()
         return result
+
+    def _save(self, result: Result) -> None:
+        """Writes the files, after which what an interrupted run left has done its service."""
+        for file in self._job.files:
+            result.save(file, **self._wishes.file_options)
+        self._work.remove()
+        if self._wishes.resume:
+            Path(partial_file(self._job.files[0])).unlink(missing_ok=True)
 
     def _tell(self, result: Result, kernels: KernelRecord, seconds: float) -> None:
         lost = result.stats["ended_by_depth"]
@@ -158,16 +182,19 @@ class _Picture:
             click.echo(f"{files}  {width}x{height}  {seconds:.2f} s  {speed:.1f} Mrays/s")
 
     def _save_partial(self, partial: Result) -> None:
-        """Saves the finished rows beside the first output and says how to render the others."""
+        """Saves the finished pixels beside the first output and says how to render the others."""
         file = partial_file(self._job.files[0])
         partial.save(file, **self._wishes.file_options)
-        x0, y0, x1, y1 = partial.crop or (0, 0, *partial.depth.shape[::-1])
-        end = y0 + self._pixels_done // (x1 - x0)
-        if end < y1:
-            rest = f"rows {y0} to {end - 1}; --crop {x0} {end} {x1} {y1} renders the others"
-        else:
-            rest = "all rows; only what comes after them is missing, so render it again"
-        talk(f"{self._interruption.reason}: {file} holds what was finished of {self._job.source}: {rest}")
+        talk(
+            f"{self._interruption.reason}: {file} holds the finished {self._percent} % of "
+            f"{self._job.source}{self._how_to_go_on()}"
+        )
+
+    def _how_to_go_on(self) -> str:
+        """The end of a sentence about a picture that is not finished."""
+        if not self._work.started:
+            return ""
+        return f"; the same command with --resume goes on from {self._work.path}"
 
 
 def _phases(result: Result) -> dict[str, float]:

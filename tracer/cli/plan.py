@@ -98,3 +98,8 @@ def partial_file(file: str) -> str:
     if os.path.isdir(name):
         raise OutputError(f"{name}: is a folder, so the interrupted picture is lost")
     return name
+
+
+def work_file(file: str) -> str:
+    """Where finished bands of a picture are kept: `out/a.work` for `out/a.exr`."""
+    return f"{os.path.splitext(file)[0]}.work"

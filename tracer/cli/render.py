@@ -34,7 +34,6 @@ def render(
     scenes: tuple[str, ...],
     frames: str | None,
     fps: float,
-    resume: bool,
     pixel: tuple[int, int] | None,
     **options: Any,
 ) -> int:
@@ -54,7 +53,9 @@ def render(
       tracer render room --precision double --supersample 4 --bits 16
       tracer render room --pixel 300 200
 
-    Ctrl-C keeps the finished rows in NAME.partial.png; a second one quits at once.
+    What a picture has finished is kept in NAME.work until the picture is written. Ctrl-C finishes the band in
+    hand and writes NAME.partial.png; a second one quits at once. The same command with --resume goes on, also
+    after a crash or a full disk, and ends with the same bytes.
 
     With --frames, -o names numbered pictures (a name without {frame} gets .0001 and so on) and movies: .mp4,
     .webm or .gif. Ctrl-C finishes the frame in hand, and --resume goes on with the next one.
@@ -84,5 +85,5 @@ def render(
             warn(f"{scene.name}: has no [[animation]], so that all frames are the same", wishes)
         return View(scene.at, "as the scene says")
 
-    course = Course(read_frames(frames), fps, resume)
+    course = Course(read_frames(frames), fps)
     return render_animations(scenes, wishes, course, animated, "{name}.png", interruption)

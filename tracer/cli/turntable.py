@@ -35,7 +35,6 @@ def turntable(
     frames: int,
     around: tuple[float, float, float] | None,
     fps: float,
-    resume: bool,
     **options: Any,
 ) -> int:
     """Render SCENE from all sides: the camera goes once around it, in N even steps, as NAME.mp4.
@@ -67,5 +66,5 @@ def turntable(
 
         return View(at, f"{frames} frames around {middle}")
 
-    course = Course(range(1, frames + 1), fps, resume)
+    course = Course(range(1, frames + 1), fps)
     return render_animations((scene,), Wishes(**options), course, view_of, "{name}.mp4", interruption)

@@ -19,28 +19,38 @@ class Film:
     """The layers of one rectangle of the picture.
 
     Layers are (h, w) or (h, w, components) by name: `color`, `alpha`, `depth`, `z` (from the canvas along the
-    view axis) and those asked for. `counts`: rays by kind and how paths ended.
+    view axis) and those asked for. `counts`: rays by kind and how paths ended; `finished`: pixels so far.
     """
 
     def __init__(self, rectangle: Rectangle, dtype: Any, counts: dict[str, int]) -> None:
         self.rectangle, self.counts = rectangle, counts
         self.arrays: dict[str, np.ndarray] = {}
+        self.finished = 0
         self._dtype = dtype
 
     def take(self, band: Band, layers: dict[str, np.ndarray]) -> None:
-        """Adds the finished rows of a band; each array holds its pixels in order, components last."""
+        """Adds a finished band; each array holds its pixels in order, components last."""
         x0, y0, x1, y1 = self.rectangle
+        self.finished += band.width * band.height
         for name, values in layers.items():
-            rows: np.ndarray = values.reshape(band.height, band.width, -1)
-            if rows.shape[2] == 1 and name != VISIBILITY:
-                rows = rows[..., 0]
-            if band.height == y1 - y0:
-                self.arrays[name] = rows
+            pixels: np.ndarray = values.reshape(band.height, band.width, -1)
+            if pixels.shape[2] == 1 and name != VISIBILITY:
+                pixels = pixels[..., 0]
+            if (band.width, band.height) == (x1 - x0, y1 - y0):
+                self.arrays[name] = pixels
                 continue
             if name not in self.arrays:
-                shape = (y1 - y0, x1 - x0, *rows.shape[2:])
-                self.arrays[name] = np.full(shape, BLANK.get(name, np.nan), rows.dtype)
-            self.arrays[name][band.y0 - y0 : band.y1 - y0] = rows
+                shape = (y1 - y0, x1 - x0, *pixels.shape[2:])
+                self.arrays[name] = np.full(shape, BLANK.get(name, np.nan), pixels.dtype)
+            self.arrays[name][self._place(band)] = pixels
+
+    def part(self, band: Band) -> dict[str, np.ndarray]:
+        """The layers of a finished band, as `take` takes them but for their shape; nothing is copied."""
+        return {name: array[self._place(band)] for name, array in self.arrays.items()}
+
+    def _place(self, band: Band) -> tuple[slice, slice]:
+        x0, y0 = self.rectangle[:2]
+        return slice(band.y0 - y0, band.y1 - y0), slice(band.x0 - x0, band.x1 - x0)
 
     def layer(self, name: str) -> np.ndarray:
         """A layer, blank where nothing was traced."""

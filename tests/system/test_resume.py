@@ -1,0 +1,190 @@
+"""A long picture survives Ctrl-C, `kill -9` and a full disk: real processes, real signals, the same bytes."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX systems")
+
+KILLS = int(os.environ.get("TRACER_KILLS", "12"))
+OPTIONS = ("--resolution", "256", "256", "--supersample", "16", "--threads", "1", "--aov", "normal")
+"""A picture of a few seconds in bands of 32 rows."""
+
+BAND = 256 * 32 * 36
+"""Bytes of a band: color, coverage, depth, z and normal in single precision."""
+
+BEGIN = ["-m", "tracer.cli", "render", "classic", "-o", "x.png", "-o", "x.exr"]
+
+
+def start(repository: Path, folder: Path, *options: str) -> subprocess.Popen[str]:
+    """A render under way; SIGINT does what it does at a terminal, however the tests were started."""
+    return subprocess.Popen(
+        [sys.executable, *BEGIN, *OPTIONS, *options],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(repository)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+
+
+def finish(process: subprocess.Popen[str]) -> tuple[int, str]:
+    """Exit code and stderr."""
+    _, talk = process.communicate(timeout=120)
+    return process.returncode, talk
+
+
+@pytest.fixture(scope="module")
+def whole(repository: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """The files of an uninterrupted run."""
+    folder = tmp_path_factory.mktemp("whole")
+    assert finish(start(repository, folder)) == (0, "")
+    return contents(folder)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in folder.iterdir() if not file.name.startswith(".tracer-")}
+
+
+def until_kept(folder: Path, process: subprocess.Popen[str], bands: int = 1) -> None:
+    """Waits until so many bands are in the work file."""
+    while process.poll() is None:
+        file = folder / "x.work"
+        if file.exists() and file.stat().st_size > bands * BAND:
+            return
+        time.sleep(0.01)
+    pytest.fail(f"the render ended: {finish(process)}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_after_a_signal_the_picture_is_completed(
+    number: int, repository: Path, tmp_path: Path, whole: dict[str, bytes]
+) -> None:
+    process = start(repository, tmp_path)
+    until_kept(tmp_path, process)
+    process.send_signal(number)
+    code, talk = finish(process)
+    assert code == 128 + number
+    told = re.search(
+        r"x\.partial\.png holds the finished (\d+) % of classic; the same command with --resume goes on from "
+        r"x\.work\n$",
+        talk,
+    )
+    assert told is not None and 0 < int(told.group(1)) < 100, talk
+    assert sorted(contents(tmp_path)) == ["x.partial.png", "x.work"]
+    process = start(repository, tmp_path, "--resume", "--progress", "json")
+    code, talk = finish(process)
+    assert code == 0
+    first = json.loads(talk.splitlines()[0])
+    assert 100 * first["done"] // first["total"] == int(told.group(1)), "all that was finished is taken over"
+    assert first["rays"] == 0
+    assert contents(tmp_path) == whole
+
+
+@pytest.mark.slow
+def test_nothing_is_lost_whenever_it_is_killed(
+    repository: Path, tmp_path: Path, whole: dict[str, bytes]
+) -> None:
+    """Killed at random moments and resumed each time; the picture grows, and its last run gives its bytes."""
+    times = random.Random(6)
+    kills = 0
+    kept = 0
+    while kills < KILLS:
+        process = start(repository, tmp_path, "--resume")
+        try:
+            process.wait(times.uniform(0.3, 4.0))
+        except subprocess.TimeoutExpired:
+            process.kill()
+            kills += 1
+        finish(process)
+        work = tmp_path / "x.work"
+        if process.returncode == 0:
+            assert contents(tmp_path) == whole
+            for file in tmp_path.iterdir():
+                file.unlink()
+            kept = 0
+        elif work.exists():
+            assert work.stat().st_size >= kept, "finished bands were lost"
+            kept = work.stat().st_size // BAND * BAND
+    code, talk = finish(start(repository, tmp_path, "--resume"))
+    assert code == 0, talk
+    assert contents(tmp_path) == whole
+
+
+@pytest.mark.slow
+def test_another_picture_is_refused_and_named(repository: Path, tmp_path: Path) -> None:
+    process = start(repository, tmp_path)
+    until_kept(tmp_path, process)
+    process.kill()
+    finish(process)
+    before = contents(tmp_path)
+    for options, name in (
+        (("--set", "camera.rotate=[1, 2]"), r"camera\.rotate"),
+        (("--seed", "3"), "seed"),
+        (("--precision", "double"), "precision"),
+        (("--supersample", "15"), "supersample"),
+        (("--crop", "0", "0", "9", "9"), "crop"),
+        (("--aov", "Ng"), "aov"),
+    ):
+        code, talk = finish(start(repository, tmp_path, "--resume", *options))
+        assert code == 2
+        assert re.fullmatch(rf"tracer: error: x\.work: was begun with another `{name}`: .*\n", talk), talk
+        assert contents(tmp_path) == before
+
+
+@pytest.mark.slow
+def test_without_resume_an_old_work_file_is_dropped_and_that_is_said(
+    repository: Path, tmp_path: Path, whole: dict[str, bytes]
+) -> None:
+    process = start(repository, tmp_path)
+    until_kept(tmp_path, process)
+    process.kill()
+    finish(process)
+    code, talk = finish(start(repository, tmp_path))
+    assert code == 0
+    assert talk == "tracer: x.work: is left of a run that was stopped; without --resume it is dropped\n"
+    assert contents(tmp_path) == whole
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("room", "file"), [("1m", r"x\.work"), ("2500k", r"x\.exr")], ids=["in the middle", "at the end"]
+)
+def test_a_full_disk_is_one_sentence_and_the_rest_goes_on(
+    room: str, file: str, repository: Path, tmp_path: Path, whole: dict[str, bytes]
+) -> None:
+    """The file system holds some bands, or all of them but not the pictures; then it is given more room."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={room}", "tmpfs", str(folder)]
+    if subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("only root mounts a file system")
+    try:
+        code, talk = finish(start(repository, folder))
+        assert code == 2
+        assert re.fullmatch(
+            rf"tracer: error: {file}: cannot be written: .*No space left on device; "
+            r"the same command with --resume goes on from x\.work\n",
+            talk,
+        ), talk
+        assert (folder / "x.work").stat().st_size > BAND
+        subprocess.run(["mount", "-o", "remount,size=32m", str(folder)], check=True)
+        code, talk = finish(start(repository, folder, "--resume", "--progress", "json"))
+        assert code == 0
+        done = json.loads(talk.splitlines()[0])["done"]
+        assert done == 256 * 256 if file == r"x\.exr" else 0 < done < 256 * 256
+        assert contents(folder) == whole
+    finally:
+        subprocess.run(["umount", str(folder)], check=True)

@@ -1,0 +1,129 @@
+"""The bands of a picture that are kept in its work file, and taken from it when the picture is resumed."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+from tracer.backends import Backend
+from tracer.canvas import Canvas
+from tracer.film.film import Film
+from tracer.film.work_file import WorkFile
+from tracer.llvm import ensure_llvm
+from tracer.scene import Scene
+from tracer.tiles import Band, Rectangle, after
+from tracer.version import __version__
+
+PATIENCE = 1.0
+"""Seconds for which nothing is written: a picture that takes no longer has nothing to lose."""
+
+_LONG = 200  # characters of a value from which on its digest stands for it
+
+
+class KeptBands:
+    """Keeps what a pass over a rectangle finishes; without a work file it does nothing. A context manager.
+
+    `seconds`: how long earlier runs traced what `restore` gave back. A band is written while the next one is
+    traced.
+    """
+
+    def __init__(self, work: WorkFile | None, film: Film, identity: Callable[[], dict[str, Any]]) -> None:
+        self._work, self._film, self._identity = work, film, identity
+        self._started = time.perf_counter()
+        self._waiting: list[tuple[Band, dict[str, Any], float]] = []
+        self._writer = ThreadPoolExecutor(1)
+        self._written: Future[None] | None = None
+        self.seconds = 0.0
+
+    def __enter__(self) -> KeptBands:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._writer.shutdown()
+
+    def restore(self) -> list[Rectangle]:
+        """Takes over what an earlier run finished of this pass; the rectangles that remain."""
+        work, film = self._work, self._film
+        remaining = [film.rectangle]
+        if work is None or not work.resume:
+            return remaining
+        if not work.started:
+            work.start(self._identity())
+        for label, arrays in work.records():
+            if tuple(label["pass"]) == film.rectangle:
+                band = Band(*label["band"])
+                film.take(band, arrays)
+                film.counts, self.seconds = label["counts"], label["seconds"]
+                remaining = after(film.rectangle, band)
+        return remaining
+
+    def finished(self, band: Band) -> None:
+        """The film has taken this band. Raises `OutputError` when it cannot be kept."""
+        if self._work is None:
+            return
+        self._wait()
+        seconds = time.perf_counter() - self._started
+        self._waiting.append((band, copy.deepcopy(self._film.counts), self.seconds + seconds))
+        if seconds > PATIENCE:
+            self._written = self._writer.submit(self._write, self._work)
+
+    def finish(self) -> None:
+        """Returns when all that was finished is written. Raises `OutputError` when it cannot be kept."""
+        self._wait()
+        if self._work is not None and self._waiting:
+            self._write(self._work)
+
+    def _wait(self) -> None:
+        if self._written is not None:
+            self._written.result()
+
+    def _write(self, work: WorkFile) -> None:
+        if not work.started:
+            work.start(self._identity())
+        waiting, self._waiting = self._waiting, []
+        for band, counts, seconds in waiting:
+            place = {"pass": self._film.rectangle, "band": (band.x0, band.y0, band.x1, band.y1)}
+            work.keep(place | {"counts": counts, "seconds": seconds}, self._film.part(band))
+
+
+def identity_of(
+    scene: Scene, canvas: Canvas, rectangle: Rectangle, backend: Backend, n: int, layers: Sequence[str]
+) -> dict[str, Any]:
+    """All that a picture depends on, by name: settings, the keys of the scene, and what its files hold."""
+    settings = {
+        "tracer version": __version__,
+        "backend": str(ensure_llvm()) if backend.name == "llvm" else backend.name,
+        "precision": backend.precision,
+        "resolution": [canvas.width, canvas.height],
+        "scale": canvas.scale,
+        "crop": rectangle,
+        "supersample": n,
+        "aov": layers,
+    }
+    keys = _flat(scene.to_dict())
+    files = {
+        f"{key} (what the file holds)": hashlib.sha256(scene.resolve(value).read_bytes()).hexdigest()
+        for key, value in keys.items()
+        if key.split(".")[-1] == "file"
+    }
+    return settings | keys | files
+
+
+def _flat(tree: Any, path: str = "") -> dict[str, Any]:
+    """The leaves of a tree of tables and lists of tables, by dotted path; a digest for long ones."""
+    if isinstance(tree, Mapping):
+        pairs = list(tree.items())
+    elif isinstance(tree, (list, tuple)) and any(isinstance(part, Mapping) for part in tree):
+        pairs = list(enumerate(tree))
+    else:
+        text = json.dumps(tree)
+        return {path: tree if len(text) <= _LONG else f"sha256 {hashlib.sha256(text.encode()).hexdigest()}"}
+    leaves: dict[str, Any] = {}
+    for name, part in pairs:
+        leaves |= _flat(part, f"{path}.{name}" if path else str(name))
+    return leaves
