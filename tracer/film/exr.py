@@ -65,7 +65,8 @@ def write_exr(
         try:
             OpenEXR.File(attributes, pixels).write(str(temporary))
         except RuntimeError as error:
-            raise OutputError(f"{os.fspath(path)}: cannot be written: {error}") from error
+            reason = str(error).rpartition('". ')[2].rstrip(".")  # without the temporary file's name
+            raise OutputError(f"{os.fspath(path)}: cannot be written: {reason}") from error
 
 
 def read_exr(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray], dict[str, Any]]:
