@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import partial
 from typing import Any
@@ -25,6 +25,7 @@ from tracer.film.result import Result
 from tracer.film.work_file import WorkFile
 from tracer.first_hits import first_triangles
 from tracer.kept_bands import KeptBands, identity_of
+from tracer.memory import need_of, rays_that_fit
 from tracer.pixels import BandPlace, pixels_of
 from tracer.replay import Program
 from tracer.scene import Scene
@@ -61,6 +62,7 @@ def render(
     threads: int | None = None,
     seed: int | None = None,
     rays_per_band: int = RAYS_PER_BAND,
+    memory: int | None = None,
     progress: Progress | None = None,
     work: WorkFile | None = None,
 ) -> Result:
@@ -77,7 +79,9 @@ def render(
         crop: (x0, y0, x1, y1) in pixels of the full picture, end exclusive.
         threads: CPU threads (LLVM); None: all cores.
         seed: of jitter and depth of field; None: as the scene says.
-        rays_per_band: primary rays of one launch; no picture depends on it.
+        rays_per_band: primary rays of one launch at most; no picture depends on it.
+        memory: bytes that the process may take, by an estimate made before the first ray: launches are made
+            as small as necessary; None: all that the machine has.
         progress: called at first and after every launch with (finished pixels, all pixels, rays of this run).
         work: where finished bands are kept, and found again after an interruption; the caller removes it
             when the result is saved. Pictures of less than a second keep nothing.
@@ -85,11 +89,12 @@ def render(
     Returns: `color` (h, w, 3) float32 (float64 in double precision), display-referred and not clamped;
         `depth` (h, w), distance from the canvas along the ray, -1 blank; `alpha`, `z`, `aovs`, `stats`.
 
-    Raises: `UsageError` and `SceneError` for bad input, `MachineError` when the machine lacks the backend,
+    Raises: `UsageError` and `SceneError` for bad input, `MachineError` when the machine lacks the backend
+        or the memory,
         `OutputError` when the work file cannot be written, `RenderInterrupted` on Ctrl-C.
     """
     settings = Settings(
-        precision, backend, supersample, aovs, scale, resolution, crop, threads, seed, rays_per_band
+        precision, backend, supersample, aovs, scale, resolution, crop, threads, seed, rays_per_band, memory
     ).checked()
     types = find_backend(settings.backend, settings.precision)
     with exact_arithmetic(), thread_count(settings.threads):
@@ -136,7 +141,8 @@ class _Job:
             earlier = _ray_count(film.counts)
             try:
                 self._report(film, earlier)
-                for band in (band for rest in remaining for band in self._bands(rest)):
+                rays = self._rays_per_band(rectangle)
+                for band in (band for rest in remaining for band in bands(rest, self.n**2, rays)):
                     self._trace_band(film, band)
                     kept.finished(band)
                     self._report(film, earlier)
@@ -146,8 +152,12 @@ class _Job:
         self.seconds["trace"] += kept.seconds + time.perf_counter() - started
         return film
 
-    def _bands(self, rectangle: Rectangle) -> Iterator[Band]:
-        return bands(rectangle, self.n**2, self.settings.rays_per_band)
+    def _rays_per_band(self, rectangle: Rectangle) -> int:
+        """As many as were asked for, or fewer, if memory is short."""
+        x0, y0, x1, y1 = rectangle
+        real, triangles = np.dtype(self.backend.dtype).itemsize, self.device.triangles is not None
+        need = need_of(self.scene, self.layers, (x1 - x0) * (y1 - y0), real, triangles)
+        return rays_that_fit(need, self.n**2, self.settings.memory, self.settings.rays_per_band)
 
     def _report(self, film: Film, earlier: int) -> None:
         if self.progress is not None:

@@ -32,6 +32,7 @@ class Settings:
     threads: int | None = None
     seed: int | None = None
     rays_per_band: int = RAYS_PER_BAND
+    memory: int | None = None
 
     def checked(self) -> Settings:
         """The settings with AOV names spelled out; raises `UsageError`."""
@@ -50,6 +51,8 @@ class Settings:
             raise UsageError(f"scale: {self.scale} is out of range; allowed is a number above 0")
         if self.threads is not None and self.threads < 1:
             raise UsageError(f"threads: {self.threads} is out of range; allowed is 1 or more")
+        if self.memory is not None and self.memory < 1:
+            raise UsageError(f"memory: {self.memory} is out of range; allowed is 1 byte or more")
         if self.resolution is not None and min(self.resolution) < 1:
             raise UsageError(f"resolution: {self.resolution} is out of range; allowed is 1 or more")
         return Settings(**(vars(self) | {"aovs": aovs}))

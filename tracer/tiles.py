@@ -18,6 +18,9 @@ from tracer.backends import Backend
 TILE = 8
 _PIXELS = TILE * TILE
 
+FEWEST_PIXELS = 2 * _PIXELS
+"""Of a launch; see `_tiles_across`."""
+
 Rectangle = tuple[int, int, int, int]
 """x0, y0, x1, y1 in pixels of the full picture, end exclusive."""
 

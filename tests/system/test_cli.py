@@ -128,7 +128,10 @@ def test_statistics(tracer: Run) -> None:
 def test_progress_as_json_lines(tracer: Run) -> None:
     done = tracer("render", "small.toml", "--progress", "json")
     lines = [json.loads(line) for line in done.stderr.splitlines()]
-    assert lines[-1].keys() == {"done", "total", "rays", "seconds"}
+    assert [line["done"] for line in lines] == [0, 192]
+    assert [line["scene"] for line in lines] == ["small", "small"]
+    assert [line["remaining"] for line in lines] == [None, 0]
+    assert lines[-1].keys() == {"scene", "done", "total", "rays", "seconds", "remaining"}
     assert lines[-1]["done"] == lines[-1]["total"] == 192
     assert lines[-1]["rays"] >= 192
 

@@ -17,9 +17,9 @@ print(json.dumps({"code": done.returncode, "peak": peak, "errors": done.stderr})
 """
 
 
-def peak_bytes(folder: Path, *options: str) -> int:
-    """Largest resident size of a whole `tracer render` of the room."""
-    command = [sys.executable, "-m", "tracer.cli", "render", "room", "--quiet", *options]
+def peak_bytes(folder: Path, *options: str, scene: str = "room") -> int:
+    """Largest resident size of a whole `tracer render`."""
+    command = [sys.executable, "-m", "tracer.cli", "render", scene, "--quiet", *options]
     run = [sys.executable, "-c", MEASURE, *command, "-o", str(folder / "big.png")]
     report = json.loads(subprocess.run(run, capture_output=True, text=True, check=True).stdout)
     assert report["code"] == 0, report["errors"]
@@ -41,3 +41,21 @@ def test_memory_grows_with_the_film_alone(tmp_path: Path) -> None:
     assert per_pixel < 40, f"{per_pixel:.1f} bytes a pixel"
     assert small + 40 * 8192**2 < 3 * 2**30, f"{small / 2**20:.0f} MiB before the first pixel"
     assert peak_bytes(tmp_path, "--resolution", str(side), str(side), "--supersample", "2") < 1.1 * large
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not say how large a process is")
+@pytest.mark.parametrize(
+    ("scene", "megabytes", "options"),
+    [
+        ("classic", 700, ("--resolution", "3072", "2048")),
+        ("classic", 800, ("--resolution", "2048", "1024", "--aov", "all")),
+        ("option_depth_of_field", 700, ("--resolution", "2048", "1024")),
+        ("room", 400, ("--resolution", "16000", "64", "--supersample", "8")),
+    ],
+)
+def test_a_process_stays_within_what_it_may_take(
+    scene: str, megabytes: int, options: tuple[str, ...], tmp_path: Path
+) -> None:
+    limit = ("--memory", f"{megabytes}M")
+    assert peak_bytes(tmp_path, *options, *limit, scene=scene) < megabytes << 20

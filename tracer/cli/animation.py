@@ -198,7 +198,8 @@ def _made_of(job: _Job, wishes: Wishes, backend: str) -> dict[str, Any]:
         record.file: hashlib.sha256(Path(scene.resolve(record.file)).read_bytes()).hexdigest()
         for record, _ in records_with_files(scene)
     }
-    options = {f"--{name}": value for name, value in wishes.settings.items() if name != "threads"}
+    free = ("threads", "memory")
+    options = {f"--{name}": value for name, value in wishes.settings.items() if name not in free}
     return {
         "version of tracer": __version__,
         "scene": scene_hash(scene),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -12,6 +13,19 @@ from tracer.cli.progress import KINDS
 LARGEST_SIDE = 65535
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+class Size(click.ParamType):
+    """A number of bytes such as 2G, 500M, 1.5GiB."""
+
+    name = "size"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Bytes; K, M, G and T are powers of 1024."""
+        found = re.fullmatch(r"(\d+(?:\.\d*)?)([KMGT]?)(?:i?B)?", str(value).strip(), re.IGNORECASE)
+        if found is None:
+            self.fail(f"{value!r} is no size; allowed: a number and K, M, G or T, such as 2G", param, ctx)
+        return int(float(found.group(1)) * 1024 ** " KMGT".index(found.group(2).upper() or " "))
 
 
 def scene_options(command: Command) -> Command:
@@ -111,6 +125,12 @@ _PICTURE_OPTIONS = (
     ),
     click.option(
         "--threads", type=click.IntRange(1, 1024), metavar="N", help="CPU threads.  [default: all cores]"
+    ),
+    click.option(
+        "--memory",
+        type=Size(),
+        metavar="SIZE",
+        help="What the process may take, e.g. 2G or 500M.  [default: what the machine has]",
     ),
     click.option(
         "--aov",

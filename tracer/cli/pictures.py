@@ -43,6 +43,7 @@ class Wishes:
     alpha: bool
     half: bool
     seed: int | None
+    memory: int | None
     resume: bool
     stats: bool
     quiet: bool
@@ -51,7 +52,17 @@ class Wishes:
     @property
     def settings(self) -> dict[str, Any]:
         """The arguments of `tracer.render`."""
-        names = ("scale", "resolution", "supersample", "crop", "precision", "backend", "threads", "seed")
+        names = (
+            "scale",
+            "resolution",
+            "supersample",
+            "crop",
+            "precision",
+            "backend",
+            "threads",
+            "seed",
+            "memory",
+        )
         return {name: getattr(self, name) for name in names} | {"aovs": ("depth", *self.aovs)}
 
     @property

@@ -26,7 +26,7 @@ def make_reporter(kind: str, name: str) -> Reporter:
     """The reporter for `--progress`; `auto` is a bar on a terminal and nothing elsewhere."""
     if kind == "auto":
         kind = "bar" if sys.stderr is not None and sys.stderr.isatty() else "none"
-    return _Bar(name) if kind == "bar" else _JsonLines() if kind == "json" else _Silence()
+    return _Bar(name) if kind == "bar" else _JsonLines(name) if kind == "json" else _Silence()
 
 
 class _Silence:
@@ -38,14 +38,27 @@ class _Silence:
 
 
 class _JsonLines:
-    """One object a line: pixels done and in all, rays and seconds so far."""
+    """One object a line: the scene, its pixels done and in all, rays and seconds so far, and the seconds that
+    remain at this rate (null at first). What an earlier run has done counts as done, and not for the rate."""
 
-    def __init__(self) -> None:
-        self._started = time.perf_counter()
+    def __init__(self, name: str) -> None:
+        self._name, self._started = name, time.perf_counter()
+        self._first: int | None = None
 
     def update(self, done: int, total: int, rays: int) -> None:
-        seconds = round(time.perf_counter() - self._started, 3)
-        click.echo(json.dumps({"done": done, "total": total, "rays": rays, "seconds": seconds}), err=True)
+        if self._first is None or done < self._first:
+            self._first = done
+        seconds = time.perf_counter() - self._started
+        new = done - self._first
+        line = {
+            "scene": self._name,
+            "done": done,
+            "total": total,
+            "rays": rays,
+            "seconds": round(seconds, 3),
+            "remaining": round(seconds * (total - done) / new, 3) if new else None,
+        }
+        click.echo(json.dumps(line), err=True)
 
     def close(self) -> None:
         pass
@@ -61,9 +74,9 @@ class _Bar:
         self._bar: Any = self._new_bar(None)
 
     def update(self, done: int, total: int, rays: int) -> None:
-        if done < self._bar.n:
+        if done < self._bar.n or (rays == 0 and done > 0):  # a second pass; what an earlier run has done
             self._bar.close()
-            self._bar = self._new_bar(total)
+            self._bar = self._new_bar(total, done)
         self._bar.total = total
         speed = rays / (time.perf_counter() - self._started) / 1e6
         self._bar.set_postfix_str(f"{speed:.1f} Mrays/s", refresh=False)
@@ -74,8 +87,9 @@ class _Bar:
     def close(self) -> None:
         self._bar.close()
 
-    def _new_bar(self, total: int | None) -> Any:
+    def _new_bar(self, total: int | None, done: int = 0) -> Any:
         from tqdm import tqdm
 
         tqdm.monitor_interval = 0  # no thread of its own
-        return tqdm(total=total, desc=self._name, file=sys.stderr, leave=False, bar_format=self.FORMAT)
+        options = {"desc": self._name, "file": sys.stderr, "leave": False, "bar_format": self.FORMAT}
+        return tqdm(total=total, initial=done, **options)

@@ -1,0 +1,101 @@
+"""How much memory a pass over a picture takes, before it starts, and how many rays at once fit in what is
+allowed.
+
+An estimate from above: the process as it is, the kernels still to come, the film and the copies of it that
+are made when it is filtered and written, and one launch.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+from tracer.errors import MachineError, UsageError
+from tracer.film.layout import COMPONENTS, VISIBILITY
+from tracer.scene import Scene
+from tracer.settings import RAYS_PER_BAND
+from tracer.tiles import FEWEST_PIXELS
+
+KERNELS = 96 << 20
+"""Bytes that compiling takes, and what Dr.Jit and NumPy set aside."""
+
+UNKNOWN_PROCESS = 320 << 20
+"""A process before its first ray, where the system does not say how large it is."""
+
+FILTER_BYTES = 100
+"""A pixel, of the depth-of-field filter: colors and depths in double precision, pixels sorted by depth."""
+
+BUNDLE_BYTES = 12
+"""A primary ray, of the search for its first triangle."""
+
+
+@dataclass(frozen=True)
+class Need:
+    """Bytes of a pass: `fixed`, and for each pixel and each primary ray of a launch."""
+
+    fixed: int
+    pixel: int
+    ray: int
+
+    def of(self, pixels: int, sub_rays: int) -> int:
+        """All bytes, with so many pixels in a launch."""
+        return self.fixed + pixels * (self.pixel + self.ray * sub_rays)
+
+
+def need_of(scene: Scene, layers: list[str], pixels: int, real: int, triangles: bool) -> Need:
+    """What a pass over so many pixels takes; `real`: bytes of a number, 4 or 8."""
+    numbers = 6 + sum(_components(scene, name) for name in layers)
+    film = numbers * real
+    written = numbers * 4 + 12
+    filtered = FILTER_BYTES if scene.camera.depth_of_field is not None else 0
+    fixed = _process() + KERNELS + pixels * (film + max(written, filtered))
+    return Need(fixed, pixel=2 * film + 32, ray=BUNDLE_BYTES if triangles else 0)
+
+
+def rays_that_fit(need: Need, sub_rays: int, limit: int | None, most: int = RAYS_PER_BAND) -> int:
+    """Primary rays of a launch that stays within `limit` bytes, or within the machine's memory without one.
+
+    Halves `most` until it fits, so that about the same limit gives the same bands. Raises `UsageError`, or
+    `MachineError`, where not even the smallest launch does.
+    """
+    allowed = limit or _memory_of_machine()
+    rays = most
+    while allowed is not None and need.of(max(rays // sub_rays, FEWEST_PIXELS), sub_rays) > allowed:
+        if rays // sub_rays <= FEWEST_PIXELS:
+            least = in_words(need.of(FEWEST_PIXELS, sub_rays))
+            if limit is None:
+                raise MachineError(
+                    f"memory: the picture takes about {least}, and this machine has {in_words(allowed)}; "
+                    "a smaller --crop, --scale or fewer layers need less, --memory allows more all the same"
+                )
+            raise UsageError(
+                f"memory: the picture takes about {least} at least, allowed are {in_words(limit)}; "
+                "a smaller --crop, --scale or fewer layers need less"
+            )
+        rays //= 2
+    return rays
+
+
+def in_words(size: int) -> str:
+    """`1.5 GiB`, `300 MiB`."""
+    return f"{size / 2**30:.1f} GiB" if size >= 2**30 else f"{-(-size // 2**20)} MiB"
+
+
+def _components(scene: Scene, name: str) -> int:
+    return len(scene.lights) if name == VISIBILITY else len(COMPONENTS.get(name, ("",)))
+
+
+def _process() -> int:
+    """Bytes of this process in memory."""
+    try:
+        with open("/proc/self/statm", encoding="ascii") as file:
+            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, AttributeError):
+        return UNKNOWN_PROCESS
+
+
+def _memory_of_machine() -> int | None:
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, AttributeError):
+        return None
