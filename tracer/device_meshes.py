@@ -120,15 +120,14 @@ def _triangle_tables(
     """The triangles of all meshes in the order of the leaves, the tree over them, and the slot of each: -1
     for those that are left out, because they have no area or repeat one of their mesh."""
     wanted = np.flatnonzero(np.concatenate([mesh.in_hierarchy for mesh in meshes.values()]))
-    corners = np.concatenate([mesh.corners for mesh in meshes.values()])[wanted]
+    corners = np.take(np.concatenate([mesh.corners for mesh in meshes.values()]), wanted, axis=0)
     hierarchy = build_hierarchy(backend, corners)
     order = wanted[hierarchy.order]
     rows = np.zeros((len(order), TRIANGLE_WORDS), backend.dtype)
-    rows[:, :9] = corners.reshape(-1, 9)[hierarchy.order]
-    rows[:, 9:12] = np.concatenate([mesh.normals for mesh in meshes.values()])[order]
-    primitives = np.concatenate([np.arange(len(mesh.corners)) + first[i] for i, mesh in meshes.items()])[
-        order
-    ]
+    rows[:, :9] = np.take(corners.reshape(-1, 9), hierarchy.order, axis=0)
+    rows[:, 9:12] = np.take(np.concatenate([mesh.normals for mesh in meshes.values()]), order, axis=0)
+    primitives = np.concatenate([np.arange(len(mesh.corners)) + first[i] for i, mesh in meshes.items()])
+    primitives = primitives[order]
     rows[:, 12], rows[:, 13] = primitives >> 16, primitives & 0xFFFF
     edges = _longest_edges(corners)
     rows[:, 14] = edges[hierarchy.order]
@@ -143,8 +142,11 @@ def _triangle_tables(
 
 def _longest_edges(corners: np.ndarray) -> np.ndarray:
     """(n,) from corners (n, 3, 3)."""
-    edges = corners - np.roll(corners, 1, axis=1)
-    return np.asarray(np.sqrt((edges.astype(np.float64) ** 2).sum(axis=-1)).max(axis=-1))
+    longest = np.zeros(len(corners))
+    for k in range(3):
+        x, y, z = (corners[:, k] - corners[:, k - 1]).T
+        np.maximum(longest, x * x + y * y + z * z, out=longest)
+    return np.sqrt(longest)
 
 
 def _enclosures(backend: Backend, meshes: dict[int, PlacedMesh]) -> list[Enclosure]:

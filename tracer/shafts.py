@@ -48,10 +48,12 @@ class Ball:
 def ball_around(points: np.ndarray, epsilon: float) -> np.ndarray:
     """(4,) center and radius of a ball that holds the points (n, 3), wide enough for every rounding of
     them."""
-    low, high = points.min(axis=0), points.max(axis=0)
+    coordinates = np.ascontiguousarray(points.T)  # many times as quick as points one after the other
+    low, high = coordinates.min(axis=1), coordinates.max(axis=1)
     center = low + (high - low) / 2
-    extent = np.abs(points).max()
-    radius = np.sqrt(((points - center) ** 2).sum(axis=1)).max() + CONTACT_REACH * epsilon * extent
+    x, y, z = coordinates - center[:, None]
+    extent = max(np.abs(low).max(), np.abs(high).max())
+    radius = np.sqrt((x * x + y * y + z * z).max()) + CONTACT_REACH * epsilon * extent
     return np.array([*center, radius])
 
 

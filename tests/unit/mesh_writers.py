@@ -8,9 +8,17 @@ import struct
 from collections.abc import Sequence
 from typing import Any
 
+from tracer.shapes.polygons import PolygonSoup
+
 Point = Sequence[float]
 
 CODES = {5120: "b", 5121: "B", 5122: "h", 5123: "H", 5125: "I", 5126: "f"}
+
+
+def faces_of(soup: PolygonSoup) -> list[list[int]]:
+    """The corners of each face, as writers take them."""
+    ends = soup.sizes.cumsum().tolist()
+    return [soup.corners[end - size : end].tolist() for end, size in zip(ends, soup.sizes, strict=True)]
 
 
 def stl_ascii(facets: Sequence[Sequence[Point]], name: str = "a") -> str:

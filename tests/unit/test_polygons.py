@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from reference.plain_polygons import cut
+from tracer.shapes import cutting
 from tracer.shapes.cutting import cut_polygons
 
 Flat = tuple[int, int]
@@ -122,3 +123,27 @@ def test_whatever_it_is_both_versions_cut_it_alike(seed: int) -> None:
             ):
                 single = (scale * points).astype(np.float32).astype(float)
                 assert cut_one(single) == [list(t) for t in cut(single.tolist())]
+
+
+def quads(kind: str, rng: np.random.Generator, count: int) -> np.ndarray:
+    """(count, 4, 3) corners of any quads."""
+    points = rng.normal(size=(count, 4, 3))
+    if kind == "coarse":
+        points = np.round(2 * points)
+    elif kind == "in a plane":
+        u, v = rng.normal(size=(2, count, 1, 3))
+        points = points[..., :1] * u + points[..., 1:2] * v
+    elif kind == "far away":
+        points = points * [1, 1, 1e-6] + 1e5
+    return points.astype(np.float32).astype(np.float64)
+
+
+@pytest.mark.parametrize("kind", ["warped", "coarse", "in a plane", "far away"])
+def test_many_quads_at_once_are_cut_like_each_by_itself(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    points = quads(kind, np.random.default_rng(9), 600)
+    sure = cutting._sure_to_need_the_other_diagonal(points)
+    assert kind == "far away" or sure.sum() > 20
+    found = cut_polygons(points.reshape(-1, 3), np.arange(2400), np.full(600, 4))
+    monkeypatch.setattr(cutting, "_sure_to_need_the_other_diagonal", lambda quads: np.zeros(len(quads), bool))
+    exact = cut_polygons(points.reshape(-1, 3), np.arange(2400), np.full(600, 4))
+    assert np.array_equal(found, exact)

@@ -6,6 +6,9 @@ from fractions import Fraction
 
 import numpy as np
 
+BLOCK = 4096
+"""Triangles at a time: what is computed of them stays near the processor."""
+
 
 def accurate_areas(corners: np.ndarray) -> np.ndarray:
     """(b - a) x (c - a) of triangles (m, 3, 3) whose corners are single precision numbers; (m, 3).
@@ -15,22 +18,32 @@ def accurate_areas(corners: np.ndarray) -> np.ndarray:
     Available Precision, 1971); the few triangles for which that is too little are computed with fractions.
     Products of single precision numbers neither vanish nor overflow in double precision.
     """
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    areas = np.empty((len(corners), 3))
+    for begin in range(0, len(corners), BLOCK):
+        block = corners[begin : begin + BLOCK]
+        areas[begin : begin + BLOCK], hard = _areas(np.ascontiguousarray(block.transpose(1, 2, 0)))
+        for number in begin + np.flatnonzero(hard):
+            areas[number] = _area_by_fractions(corners[number])
+    return areas
+
+
+def _areas(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The areas (m, 3) of triangles with `corners` (3, 3, m), corners first, and whether two doubles were too
+    little for one (m,)."""
+    a, b, c = corners
     (u, u_low), (v, v_low) = _exact_sum(b, -a), _exact_sum(c, -a)
-    inexact = (u_low != 0).any(axis=1) | (v_low != 0).any(axis=1)
+    inexact = (u_low != 0).any(axis=0) | (v_low != 0).any(axis=0)
     areas, sizes = np.empty_like(a), np.empty_like(a)
     for axis in range(3):
         y, z = (axis + 1) % 3, (axis + 2) % 3
-        p, p_low = _product(u[:, y], u_low[:, y], v[:, z], v_low[:, z])
-        q, q_low = _product(u[:, z], u_low[:, z], v[:, y], v_low[:, y])
+        p, p_low = _product(u[y], u_low[y], v[z], v_low[z])
+        q, q_low = _product(u[z], u_low[z], v[y], v_low[y])
         difference, low = _exact_sum(p, -q)
-        areas[:, axis] = difference + (low + (p_low - q_low))
-        sizes[:, axis] = np.where(inexact | (p_low != 0) | (q_low != 0), np.abs(p) + np.abs(q), 0)
+        areas[axis] = difference + (low + (p_low - q_low))
+        sizes[axis] = np.where(inexact | (p_low != 0) | (q_low != 0), np.abs(p) + np.abs(q), 0)
     # But for the last rounding a component is wrong by 2^-102 (|p| + |q|) at most: is that below one ulp?
-    hard = 2.0**-102 * sizes.max(axis=1) > 2.0**-53 * np.abs(areas).max(axis=1)
-    for number in np.flatnonzero(hard & np.isfinite(sizes).all(axis=1)):
-        areas[number] = _area_by_fractions(corners[number])
-    return areas
+    hard = 2.0**-102 * sizes.max(axis=0) > 2.0**-53 * np.abs(areas).max(axis=0)
+    return areas.T, hard & np.isfinite(sizes).all(axis=0)
 
 
 def _exact_sum(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

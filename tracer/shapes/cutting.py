@@ -14,6 +14,9 @@ import numpy as np
 LARGEST_CONCAVE = 20_000
 """Corners of a polygon that is not cut into a fan: the time grows with their square."""
 
+OTHER_DIAGONAL = np.array([[1, 2, 3], [1, 3, 0]])
+"""Corners of the two triangles of a quad that is not cut into a fan."""
+
 Exact = tuple[int, int]  # a point of a plane, in units of the smallest single precision number
 
 
@@ -23,17 +26,22 @@ def cut_polygons(vertices: np.ndarray, corners: np.ndarray, sizes: np.ndarray) -
     `vertices` (n, 3): single precision values in float64; `corners` (k,): the vertex numbers of all polygons
     one after the other; `sizes` (f,): how many of each, three or more. ValueError where one is too large.
     """
+    large = np.flatnonzero(sizes > 3)
+    if not len(large):
+        return np.arange(len(corners)).reshape(-1, 3)
     first = np.cumsum(sizes) - sizes
     fans = sizes - 2
     begin = np.cumsum(fans) - fans
     places = np.repeat(first, fans)[:, None] + np.zeros(3, np.int64)
     places[:, 1] += np.arange(len(places)) - np.repeat(begin, fans) + 1
     places[:, 2] = places[:, 1] + 1
-    large = np.flatnonzero(sizes > 3)
-    if not len(large):
-        return places
     sure = _sure_fans(vertices[corners[places[np.repeat(sizes > 3, fans)]]], fans[large])
-    for face in large[~sure].tolist():
+    large = large[~sure]
+    quads = large[sizes[large] == 4]
+    quads = quads[_sure_to_need_the_other_diagonal(vertices[corners[first[quads, None] + np.arange(4)]])]
+    for k in range(2):
+        places[begin[quads] + k] = first[quads, None] + OTHER_DIAGONAL[k]
+    for face in np.setdiff1d(large, quads).tolist():
         start, size = first[face], sizes[face]
         cut = _cut_exactly(vertices[corners[start : start + size]])
         if cut is None:
@@ -46,23 +54,57 @@ def cut_polygons(vertices: np.ndarray, corners: np.ndarray, sizes: np.ndarray) -
     return places
 
 
+# ---- Beyond rounding, many at once -------------------------------------------------------------------------
+
+
 def _sure_fans(triangles: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """(f,) whether a fan is right beyond rounding, whichever axis is dropped; `triangles` (m, 3, 3) of all
     fans, `counts` (f,) of each."""
-    u, v = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    begin = np.cumsum(counts) - counts
-    areas, sizes = np.empty_like(u), np.empty_like(u)
-    for axis in range(3):
-        y, z = (axis + 1) % 3, (axis + 2) % 3
-        p, q = u[:, y] * v[:, z], u[:, z] * v[:, y]
-        areas[:, axis], sizes[:, axis] = p - q, np.abs(p) + np.abs(q)
-    errors = 2.0**-50 * sizes  # of a component of an area; that of their sum follows
-    total = np.add.reduceat(areas, begin)
-    wrong = (1 + counts[:, None]) * np.add.reduceat(errors, begin)
-    may_be_dropped = np.abs(total) + wrong >= (np.abs(total) - wrong).max(axis=1, keepdims=True)
-    turns = areas * np.sign(total).repeat(counts, axis=0) > errors
-    right = (np.abs(total) > wrong) & np.logical_and.reduceat(turns, begin)
-    return (right | ~may_be_dropped).all(axis=1)
+    turns = _Turns(triangles, counts)
+    return turns.on_every_axis(np.logical_and.reduceat(turns.left, turns.begin))
+
+
+def _sure_to_need_the_other_diagonal(quads: np.ndarray) -> np.ndarray:
+    """(q,) whether beyond rounding a fan is wrong and the cut from corner 1 to corner 3 right, for quads
+    (q, 4, 3): these are the ears that `_ears` finds."""
+    if not len(quads):
+        return np.zeros(0, bool)
+    counts = np.full(len(quads), 2)
+    fan = _Turns(quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3), counts)
+    other = _sure_fans(quads[:, OTHER_DIAGONAL].reshape(-1, 3, 3), counts)
+    return other & fan.on_every_axis(np.logical_or.reduceat(fan.right, fan.begin))
+
+
+class _Turns:
+    """How the triangles (m, 3, 3) of polygons with `counts` (f,) of them turn, seen along each axis.
+
+    `left`, `right` (m, 3): true beyond rounding, where the polygon as a whole turns left; `begin` (f,): the
+    first triangle of each.
+    """
+
+    def __init__(self, triangles: np.ndarray, counts: np.ndarray) -> None:
+        u, v = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+        self.begin = np.cumsum(counts) - counts
+        areas, sizes = np.empty_like(u), np.empty_like(u)
+        for axis in range(3):
+            y, z = (axis + 1) % 3, (axis + 2) % 3
+            p, q = u[:, y] * v[:, z], u[:, z] * v[:, y]
+            areas[:, axis], sizes[:, axis] = p - q, np.abs(p) + np.abs(q)
+        errors = 2.0**-50 * sizes  # of a component of an area; that of their sum follows
+        total = np.add.reduceat(areas, self.begin)
+        wrong = (1 + counts[:, None]) * np.add.reduceat(errors, self.begin)
+        size = np.abs(total)
+        self._may_be_dropped = size + wrong >= (size - wrong).max(axis=1, keepdims=True)
+        self._has_a_sign = size > wrong
+        signed = areas * np.sign(total).repeat(counts, axis=0)
+        self.left, self.right = signed > errors, signed < -errors
+
+    def on_every_axis(self, holds: np.ndarray) -> np.ndarray:
+        """(f,) what `holds` (f, 3) says for every axis that may be dropped; those polygons have a sign."""
+        return np.asarray(((holds & self._has_a_sign) | ~self._may_be_dropped).all(axis=1))
+
+
+# ---- Exactly, one by one -----------------------------------------------------------------------------------
 
 
 def _cut_exactly(polygon: np.ndarray) -> tuple[list[Exact], np.ndarray] | None:

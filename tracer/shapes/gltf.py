@@ -18,7 +18,7 @@ from tracer.errors import SceneError
 from tracer.messages import show
 from tracer.shapes.gltf_file import GltfFile, entries, table
 from tracer.shapes.gltf_nodes import IDENTITY, Matrix, applied, cofactors, determinant, node_matrix, product
-from tracer.shapes.polygons import PolygonSoup
+from tracer.shapes.polygons import PolygonSoup, triangle_sizes
 
 Primitive = tuple[np.ndarray, np.ndarray | None, np.ndarray]
 """Vertices (n, 3), normals (n, 3) or None, faces (m, 3)."""
@@ -65,10 +65,9 @@ class _Reader:
                 placed += len(points)
                 complete = complete and its_normals is not None
                 normals += [its_normals] if its_normals is not None else []
-        all_faces = np.concatenate(faces)
-        if not complete:
-            return PolygonSoup(np.concatenate(vertices), np.zeros((0, 3)), all_faces, ())
-        return PolygonSoup(np.concatenate(vertices), np.concatenate(normals), all_faces, all_faces)
+        corners, all_normals = np.concatenate(faces).reshape(-1), np.concatenate(normals)
+        soup = PolygonSoup(np.concatenate(vertices), all_normals, corners, triangle_sizes(corners), corners)
+        return soup if complete else replace(soup, normals=np.zeros((0, 3)))
 
     def _nodes(self) -> Iterator[tuple[int, dict[str, Any], Matrix]]:
         """Number, table and place of the scene's nodes, each before its children, in the file's order."""

@@ -16,7 +16,7 @@ import numpy as np
 from tracer.errors import SceneError
 from tracer.messages import LONGEST_SHOWN
 from tracer.shapes.ply_header import WIDTHS, Element, read_header
-from tracer.shapes.polygons import Polygons, PolygonSoup, check_faces
+from tracer.shapes.polygons import PolygonSoup, check_faces
 from tracer.shapes.words import short
 
 _FACE_LISTS = ("vertex_indices", "vertex_index")
@@ -34,11 +34,11 @@ def read_ply(path: Path) -> PolygonSoup:
         reader = _Reader(body, order)
         values = {element.name: reader.read(element) for element in elements}
         vertices, normals = _vertices(values["vertex"])
-        faces = _faces(values.get("face", {}))
+        corners, sizes = _faces(values.get("face", {}))
     except (ValueError, KeyError) as error:
         raise SceneError(f"{path}: is damaged or no PLY file ({error})") from None
-    check_faces(path, faces, len(vertices))
-    return PolygonSoup(vertices, normals, faces, faces if len(normals) else ())
+    check_faces(path, corners, sizes, len(vertices))
+    return PolygonSoup(vertices, normals, corners, sizes, corners)
 
 
 # ---- Body --------------------------------------------------------------------------------------
@@ -156,8 +156,9 @@ def _vectors(columns: dict[str, Any], names: tuple[str, str, str]) -> np.ndarray
     return np.column_stack([np.asarray(columns[name], np.float64) for name in names])
 
 
-def _faces(columns: dict[str, Any]) -> Polygons:
-    """The vertex numbers of each face, not yet checked against the number of vertices."""
+def _faces(columns: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """The vertex numbers of all faces, not yet checked against the number of vertices, and the size of
+    each."""
     key = next((name for name in _FACE_LISTS if isinstance(columns.get(name), tuple)), None)
     numbers, lengths = (np.asarray(column) for column in columns[key]) if key else (np.zeros(0), np.zeros(0))
     lengths = lengths.astype(np.int64)
@@ -165,8 +166,4 @@ def _faces(columns: dict[str, Any]) -> Polygons:
         raise ValueError(f"face {np.argmax(lengths < 3)} has fewer than three corners")
     if not (np.isfinite(numbers) & (np.floor(numbers) == numbers)).all():
         raise ValueError("a face names a vertex that is no whole number")
-    corners = np.clip(numbers, -_MOST, _MOST).astype(np.int64)
-    if (lengths == 3).all():
-        return corners.reshape(-1, 3)
-    all_corners, ends = corners.tolist(), np.cumsum(lengths).tolist()
-    return [all_corners[end - length : end] for end, length in zip(ends, lengths.tolist(), strict=True)]
+    return np.clip(numbers, -_MOST, _MOST).astype(np.int64), lengths

@@ -2,61 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import chain
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeAlias
 
 import numpy as np
 
 from tracer.errors import SceneError
 
-Polygons: TypeAlias = Sequence[Sequence[int]] | np.ndarray
-"""For each face the numbers of its corners; an array (m, 3) where all faces are triangles."""
+_NO_NUMBERS = np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True)
 class PolygonSoup:
-    """`vertices` (n, 3), `normals` (k, 3); `faces` and `face_normals`: for each face the numbers of its
-    corners and of their normals (-1: none); `places` (n,), where the file does not number its vertices: the
-    first vertex at the place of each; `other_files`: what was read beside the file itself."""
+    """`vertices` (n, 3), `normals` (k, 3); `sizes` (f,): the corners of each face, `corners` (c,): the vertex
+    numbers of all faces, one after the other, `corner_normals` (c,): those of their normals (-1: none), or
+    (0,); `places` (n,), where the file does not number its vertices: the first vertex at the place of each;
+    `other_files`: what was read beside the file itself."""
 
     vertices: np.ndarray
     normals: np.ndarray
-    faces: Polygons
-    face_normals: Polygons
+    corners: np.ndarray
+    sizes: np.ndarray
+    corner_normals: np.ndarray = field(default_factory=_NO_NUMBERS.copy)
     places: np.ndarray | None = None
     other_files: tuple[Path, ...] = ()
 
     @property
     def has_all_normals(self) -> bool:
         """Whether every corner of every face has a normal: only then do the file's normals count."""
-        return len(self.normals) > 0 and bool((flat(self.face_normals) >= 0).all())
-
-    @property
-    def sizes(self) -> np.ndarray:
-        """(f,) the number of corners of each face."""
-        if isinstance(self.faces, np.ndarray):
-            return np.full(len(self.faces), 3)
-        return np.fromiter(map(len, self.faces), np.int64, len(self.faces))
+        has_some = len(self.normals) > 0 and len(self.corner_normals) == len(self.corners)
+        return has_some and bool((self.corner_normals >= 0).all())
 
 
-def flat(polygons: Polygons) -> np.ndarray:
-    """(k,) the numbers of all polygons, one after the other."""
-    if isinstance(polygons, np.ndarray):
-        return polygons.reshape(-1)
-    return np.fromiter(chain.from_iterable(polygons), np.int64)
+def triangle_sizes(corners: np.ndarray) -> np.ndarray:
+    """(f,) the sizes of faces that are all triangles, `corners` (3 f,)."""
+    return np.full(len(corners) // 3, 3)
 
 
-def check_faces(path: Path, faces: Polygons, count: int) -> None:
+def check_faces(path: Path, corners: np.ndarray, sizes: np.ndarray, count: int) -> None:
     """Raises `SceneError` for the number of a vertex that does not exist."""
-    numbers = flat(faces)
-    if not ((numbers < 0) | (numbers >= count)).any():
+    wrong = (corners < 0) | (corners >= count)
+    if not wrong.any():
         return
-    for number, face in enumerate(faces):
-        if max(face) >= count or min(face) < 0:
-            wrong = max(face) if max(face) >= count else min(face)
-            raise SceneError(
-                f"{path}: face {number} names vertex {wrong}, counted from 0; the file has {count}"
-            )
+    ends = np.cumsum(sizes)
+    face = int(np.searchsorted(ends, np.argmax(wrong), side="right"))
+    own = corners[ends[face] - sizes[face] : ends[face]]
+    number = own.max() if own.max() >= count else own.min()
+    raise SceneError(f"{path}: face {face} names vertex {number}, counted from 0; the file has {count}")

@@ -7,6 +7,9 @@ import numpy as np
 _FACTORS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
 """Large odd numbers without a meaning, which spread bits."""
 
+BLOCK = 8192
+"""Triangles at a time: what is computed of them stays near the processor."""
+
 
 def repeated(corners: np.ndarray) -> np.ndarray:
     """(m,) whether a triangle of `corners` (m, 3, 3) has the same corners as one before it.
@@ -16,6 +19,9 @@ def repeated(corners: np.ndarray) -> np.ndarray:
     """
     result = np.zeros(len(corners), bool)
     hashes = _hashes(corners)
+    in_order = np.sort(hashes)
+    if not (in_order[1:] == in_order[:-1]).any():
+        return result
     order = np.argsort(hashes, kind="stable")
     same = hashes[order[1:]] == hashes[order[:-1]]
     in_doubt = order[np.r_[False, same] | np.r_[same, False]]
@@ -39,13 +45,17 @@ def first_at_place(vertices: np.ndarray) -> np.ndarray:
 
 def _hashes(corners: np.ndarray) -> np.ndarray:
     """(m,) equal for triangles with equal corners, whatever their order."""
-    mixed = _mixed(corners)
-    return (mixed * mixed).sum(axis=-1, dtype=np.uint64)
+    hashes = np.empty(len(corners), np.uint64)
+    for begin in range(0, len(corners), BLOCK):
+        a, b, c = (_mixed(corners[begin : begin + BLOCK, k]) for k in range(3))
+        hashes[begin : begin + BLOCK] = a * a + b * b + c * c
+    return hashes
 
 
 def _mixed(points: np.ndarray) -> np.ndarray:
-    """(...) a hash of points (..., 3)."""
-    bits = (np.ascontiguousarray(points) + 0.0).view(np.uint64)  # -0.0 becomes 0.0, which it equals
-    mixed = (bits * _FACTORS).sum(axis=-1, dtype=np.uint64)
+    """(n,) a hash of points (n, 3)."""
+    coordinates = np.ascontiguousarray(points.T) + 0.0  # -0.0 becomes 0.0, which it equals
+    x, y, z = coordinates.view(np.uint64) * _FACTORS[:, None]
+    mixed = x + y + z
     mixed = (mixed ^ (mixed >> np.uint64(29))) * _FACTORS[0]
-    return mixed ^ (mixed >> np.uint64(32))
+    return np.asarray(mixed ^ (mixed >> np.uint64(32)))

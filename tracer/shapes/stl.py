@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from tracer.errors import SceneError
-from tracer.shapes.polygons import PolygonSoup
+from tracer.shapes.polygons import PolygonSoup, triangle_sizes
 from tracer.shapes.repetitions import first_at_place
 from tracer.shapes.words import lines_of, short, three_floats
 
@@ -33,8 +33,9 @@ def read_stl(path: Path) -> PolygonSoup:
     # Many binary files begin with "solid" too, but no text holds a zero.
     is_text = data.removeprefix(b"\xef\xbb\xbf").lstrip()[:5].lower() == b"solid" and b"\0" not in data
     vertices = _ascii(path, data) if is_text else _binary(path, data)
-    numbers = np.arange(len(vertices)).reshape(-1, 3)
-    return PolygonSoup(vertices, np.zeros((0, 3)), numbers, (), first_at_place(vertices))
+    corners = np.arange(len(vertices))
+    sizes, places = triangle_sizes(corners), first_at_place(vertices)
+    return PolygonSoup(vertices, np.zeros((0, 3)), corners, sizes, places=places)
 
 
 def _binary(path: Path, data: bytes) -> np.ndarray:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from tracer.shapes.areas import accurate_areas
 from tracer.shapes.cutting import cut_polygons
 from tracer.shapes.mesh import Mesh
 from tracer.shapes.mesh_files import read_polygons
-from tracer.shapes.polygons import PolygonSoup, flat
+from tracer.shapes.polygons import PolygonSoup
 from tracer.shapes.repetitions import repeated
 
 BUILTIN_MESHES: dict[str, tuple[list[tuple[int, int, int]], list[tuple[int, ...]]]] = {
@@ -123,7 +124,7 @@ def _builtin(name: str) -> MeshData:
 
 def _read_file(path: Path, where: str) -> tuple[MeshData, tuple[Path, ...]]:
     soup = read_polygons(path)
-    if len(soup.faces) == 0:
+    if len(soup.sizes) == 0:
         raise SceneError(f"{where}.file: {path} has no faces; allowed: a mesh with one triangle at least")
     data = replace(_triangles(soup, str(path)), files=(path, *soup.other_files))
     return data, soup.other_files
@@ -133,7 +134,7 @@ def place_mesh(data: MeshData, placement: Placement) -> PlacedMesh:
     """The mesh in world space, rounded to single precision; infinite where it leaves that range."""
     with np.errstate(over="ignore", invalid="ignore"):
         vertices = placement.points(data.vertices).astype(np.float32).astype(np.float64)
-        corners = vertices[data.triangles]
+        corners = np.take(vertices, data.triangles, axis=0)  # three times as quick as by an index
         areas = accurate_areas(corners)
     return PlacedMesh(data, placement, corners, _unit(areas), repeated(corners))
 
@@ -157,7 +158,9 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def _plain_soup(vertices: Sequence[Sequence[float]], faces: Sequence[Sequence[int]]) -> PolygonSoup:
-    return PolygonSoup(np.array(vertices, np.float64), np.zeros((0, 3)), faces, ())
+    sizes = np.fromiter(map(len, faces), np.int64, len(faces))
+    corners = np.fromiter(chain.from_iterable(faces), np.int64)
+    return PolygonSoup(np.array(vertices, np.float64), np.zeros((0, 3)), corners, sizes)
 
 
 def _triangles(soup: PolygonSoup, where: str) -> MeshData:
@@ -166,11 +169,10 @@ def _triangles(soup: PolygonSoup, where: str) -> MeshData:
         vertices = soup.vertices.astype(np.float32).astype(np.float64)
     if not np.isfinite(vertices).all():
         raise SceneError(f"{where}: a vertex is not finite or leaves the range of single precision")
-    corners, sizes = flat(soup.faces), soup.sizes
     try:
-        places = cut_polygons(vertices, corners, sizes)
+        places = cut_polygons(vertices, soup.corners, soup.sizes)
     except ValueError as error:
         raise SceneError(f"{where}: {error}") from None
-    normals = soup.normals[flat(soup.face_normals)[places]] if soup.has_all_normals else np.zeros((0, 3, 3))
-    numbers = np.repeat(np.arange(len(sizes)), sizes - 2)
-    return MeshData(vertices, corners[places], numbers, normals, soup.places)
+    normals = soup.normals[soup.corner_normals[places]] if soup.has_all_normals else np.zeros((0, 3, 3))
+    numbers = np.repeat(np.arange(len(soup.sizes)), soup.sizes - 2)
+    return MeshData(vertices, soup.corners[places], numbers, normals, soup.places)
