@@ -41,7 +41,7 @@ def slow_render(repository: Path, folder: Path, *options: str) -> Iterator[subpr
     try:
         assert process.stderr is not None
         for _ in range(2):  # at the start, after the first band
-            assert process.stderr.readline().startswith('{"scene"')
+            assert process.stderr.readline().startswith('{"done"')
         time.sleep(0.3)
         yield process
     finally:

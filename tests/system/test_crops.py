@@ -1,4 +1,4 @@
-"""Crops put together, and pictures traced in small pieces, have the bytes of the whole: the command itself."""
+"""Crops put together have the bytes of the whole, and memory has a limit: the command itself."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ def test_memory_grows_with_the_film_alone(tmp_path: Path) -> None:
     ("scene", "megabytes", "options"),
     [
         ("classic", 700, ("--resolution", "3072", "2048")),
-        ("classic", 800, ("--resolution", "2048", "1024", "--aov", "all")),
+        ("classic", 1000, ("--resolution", "2048", "1024", "--aov", "all")),
         ("option_depth_of_field", 700, ("--resolution", "2048", "1024")),
         ("room", 400, ("--resolution", "16000", "64", "--supersample", "8")),
     ],

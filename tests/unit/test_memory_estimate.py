@@ -22,7 +22,7 @@ def test_the_largest_launch_that_fits(sub_rays: int) -> None:
         rays = rays_that_fit(NEED, sub_rays, limit, most=1 << 20)
         assert NEED.of(max(128, rays // sub_rays), sub_rays) <= limit
         assert rays == 1 << 20 or NEED.of(2 * rays // sub_rays, sub_rays) > limit
-    with pytest.raises(UsageError, match="takes about 1 MiB at least, allowed are 1 MiB"):
+    with pytest.raises(UsageError, match=r"takes about (. MiB) at least, allowed are \1"):
         rays_that_fit(NEED, sub_rays, NEED.of(128, sub_rays) - 1)
 
 

@@ -38,8 +38,8 @@ class _Silence:
 
 
 class _JsonLines:
-    """One object a line: the scene, its pixels done and in all, rays and seconds so far, and the seconds that
-    remain at this rate (null at first). What an earlier run has done counts as done, and not for the rate."""
+    """One object a line: pixels done and in all, rays and seconds so far, seconds that remain at this rate (null
+    at first), and the scene. What an earlier run has done counts as done, and not for the rate."""
 
     def __init__(self, name: str) -> None:
         self._name, self._started = name, time.perf_counter()
@@ -51,14 +51,13 @@ class _JsonLines:
         seconds = time.perf_counter() - self._started
         new = done - self._first
         line = {
-            "scene": self._name,
             "done": done,
             "total": total,
             "rays": rays,
             "seconds": round(seconds, 3),
             "remaining": round(seconds * (total - done) / new, 3) if new else None,
         }
-        click.echo(json.dumps(line), err=True)
+        click.echo(json.dumps(line | ({"scene": self._name} if self._name else {})), err=True)
 
     def close(self) -> None:
         pass
@@ -74,7 +73,8 @@ class _Bar:
         self._bar: Any = self._new_bar(None)
 
     def update(self, done: int, total: int, rays: int) -> None:
-        if done < self._bar.n or (rays == 0 and done > 0):  # a second pass; what an earlier run has done
+        resumed = self._bar.total is None and rays == 0  # what an earlier run has done makes no rate
+        if done < self._bar.n or resumed:
             self._bar.close()
             self._bar = self._new_bar(total, done)
         self._bar.total = total
