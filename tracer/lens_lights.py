@@ -14,11 +14,12 @@ from tracer.device_scene import DeviceScene
 from tracer.direct_light import plane_bits_of
 from tracer.intersection import Surface, closest_hit
 from tracer.light_tables import fetch_ball, fetch_sample, jitter_shift
-from tracer.occlusion import find_suspects, hidden, transmittance
+from tracer.occlusion import hidden, transmittance
 from tracer.ray_tree import LightTerm, Triple
 from tracer.replay import put_together, take_apart
 from tracer.scene import Scene
 from tracer.spawn import MaterialRow
+from tracer.suspects import find_suspects
 
 
 class LightsUnderTheLens:

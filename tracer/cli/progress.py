@@ -38,8 +38,8 @@ class _Silence:
 
 
 class _JsonLines:
-    """One object a line: pixels done and in all, rays and seconds so far, seconds that remain at this rate (null
-    at first), and the scene. What an earlier run has done counts as done, and not for the rate."""
+    """One object a line: pixels done and in all, rays and seconds so far, seconds that remain at this rate
+    (null at first), the scene. What an earlier run has done counts as done, and not for the rate."""
 
     def __init__(self, name: str) -> None:
         self._name, self._started = name, time.perf_counter()
