@@ -243,7 +243,7 @@ def test_what_was_finished_is_kept_when_it_is_stopped(
     )
     assert process.stderr is not None
     for _ in range(3):
-        assert process.stderr.readline().startswith('{"done"')
+        assert json.loads(process.stderr.readline())["done"] > 0
     process.send_signal(signal.SIGINT)
     started = time.monotonic()
     output, talk = process.communicate(timeout=60)
