@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tracer
-from tracer import direct_light, ray
+from tracer import arrival, ray
 from tracer.backends import Backend, exact_arithmetic, find_backend
 from tracer.ray import mirror_direction, normalize
 from tracer.textures.cells import CellRule
@@ -105,7 +105,7 @@ def test_highlights_vanish_where_they_leave_the_range(exponent: float, precision
     small = 2 ** np.linspace(-5, 0, 100_001)
     base = np.concatenate([[0.0, 1e-30, 1.0], np.linspace(0.0, 1.0, 100_001), small]).astype(backend.dtype)
     with exact_arithmetic():
-        found = direct_light._power(backend.Float(base), backend.Float(exponent), backend.Bool(base >= 0))
+        found = arrival._power(backend.Float(base), backend.Float(exponent), backend.Bool(base >= 0))
         found = found.numpy()
     exact = base.astype(np.float64) ** exponent
     assert np.isfinite(found).all()
