@@ -249,7 +249,8 @@ def test_ctrl_c_and_kill_lose_no_finished_frame(variables: dict[str, str], tmp_p
     process = start(broken, variables, *LONG, "--resume")
     output, talk = process.communicate(timeout=120)
     assert (process.returncode, talk) == (0, "")
-    assert names(broken) == names(whole)
+    # Killed in the middle of a movie, a process leaves its temporary file: no other may remove it.
+    assert [name for name in names(broken) if not name.startswith(".tracer-")] == names(whole)
     for name in names(whole):
         if not name.endswith(".npz"):
             assert (broken / name).read_bytes() == (whole / name).read_bytes(), name
