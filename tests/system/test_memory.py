@@ -59,3 +59,10 @@ def test_a_process_stays_within_what_it_may_take(
 ) -> None:
     limit = ("--memory", f"{megabytes}M")
     assert peak_bytes(tmp_path, *options, *limit, scene=scene) < megabytes << 20
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="resource usage of children is a Unix thing")
+def test_launches_are_smaller_where_less_is_allowed(tmp_path: Path) -> None:
+    options = ("--resolution", "2048", "1536", "--aov", "all", "--memory")
+    assert peak_bytes(tmp_path, *options, "1500M") < 0.8 * peak_bytes(tmp_path, *options, "8G")
