@@ -10,7 +10,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from tracer.acceleration.bundles import DOUBTFUL, RAYS, Bundles, doubtful_rays, nearest_of_neighbors
+from tracer.acceleration.bundles import DOUBTFUL, RAYS, Bundles, nearest_of_neighbors, settle_doubtful
 from tracer.acceleration.triangle import TriangleTables
 from tracer.backends import Backend
 from tracer.canvas import Canvas, DeviceCanvas
@@ -47,11 +47,7 @@ def first_triangles(
     if rays < FEWEST_RAYS or _edge_in_pixels(scene.triangles, canvas) < SMALLEST_EDGE:
         return dr.opaque(index, DOUBTFUL, rays)
     found = bundled(scene, device_canvas, place, size, rays)["primitive"]
-    numbers = doubtful_rays(found)
-    if len(numbers) > 0:
-        dr.eval(numbers)
-        dr.scatter(found, singly(scene, device_canvas, place, size, numbers)["primitive"], numbers)
-        dr.eval(found)
+    settle_doubtful(found, lambda numbers: singly(scene, device_canvas, place, size, numbers)["primitive"])
     return found
 
 

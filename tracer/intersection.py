@@ -15,6 +15,7 @@ from tracer.acceleration.departure import Departure, Ground
 from tracer.acceleration.traverse import distance_to, visit_triangles
 from tracer.acceleration.triangle import gather_triangle
 from tracer.backends import INVALID
+from tracer.branches import changed_where
 from tracer.device_scene import KIND_UNIT, MESH, PLANE, SPHERE, DeviceScene
 from tracer.ray import (
     Hit,
@@ -126,19 +127,12 @@ def known_triangle(scene: DeviceScene, ray: Ray, hit: Hit, active: Any, primitiv
     assert scene.triangles is not None
     backend, tables = scene.backend, scene.triangles
 
-    def meet(hit: Hit) -> tuple[Hit]:
+    def meet(hit: Hit) -> Hit:
         triangle = gather_triangle(backend, tables.rows, _slot(scene, primitive, True))
-        t = distance_to(backend, tables.lists, ray, triangle)
-        return (keep_nearer(hit, t, True, primitive),)
+        return keep_nearer(hit, distance_to(backend, tables.lists, ray, triangle), True, primitive)
 
-    (hit,) = dr.if_stmt(
-        args=(hit,),
-        cond=active & (primitive != INVALID),
-        true_fn=meet,
-        false_fn=lambda hit: (hit,),
-        label="known triangle",
-    )
-    return hit
+    found: Hit = changed_where(active & (primitive != INVALID), hit, meet, label="known triangle")
+    return found
 
 
 def shape_of(scene: DeviceScene, primitive: Any, active: Any) -> Any:
@@ -218,24 +212,17 @@ def _smooth_normal(
     backend = scene.backend
     triangles, vertex_normals = scene.triangles.rows, scene.smooth.normals
 
-    def interpolated(lit_side: Any) -> tuple[Any]:
+    def interpolated(lit_side: Any) -> Any:
         slot = _slot(scene, primitive, True)
         triangle = gather_triangle(backend, triangles, slot)
         normals = gather_triangle(backend, vertex_normals, slot)
         b1, b2 = barycentrics(triangle.v0, triangle.v1, triangle.v2, p)
         mixed = normalize((1 - b1 - b2) * normals.v0 + b1 * normals.v1 + b2 * normals.v2)
         mixed = dr.select(entering, mixed, -mixed)
-        return (dr.select(dr.dot(mixed, d) < 0, mixed, lit_side),)
+        return dr.select(dr.dot(mixed, d) < 0, mixed, lit_side)
 
     wanted = dr.gather(backend.UInt32, scene.smooth.shapes, shape, active)
-    (normal,) = dr.if_stmt(
-        args=(lit_side,),
-        cond=active & (wanted == 1),
-        true_fn=interpolated,
-        false_fn=lambda lit_side: (lit_side,),
-        label="smooth",
-    )
-    return normal
+    return changed_where(active & (wanted == 1), lit_side, interpolated, label="smooth")
 
 
 def barycentrics(v0: Any, v1: Any, v2: Any, p: Any) -> tuple[Any, Any]:

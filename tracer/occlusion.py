@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import drjit as dr
 
 from tracer.acceleration.traverse import visit_triangles
+from tracer.branches import changed_where
 from tracer.device_scene import DeviceScene
 from tracer.intersection import Surface, departure_to_light, shape_of
 from tracer.ray import Segment
@@ -44,9 +44,8 @@ def hidden_by_sphere(
             blocked = blocked | slot.blocks(segment, active)
         else:
             asked = active & ~blocked & ((suspects.spheres & (1 << number)) != 0)
-            blocked = _changed_where(
-                asked, blocked, partial(lambda blocked, slot: slot.blocks(segment, True), slot=slot)
-            )
+            blocks = partial(lambda blocked, slot: slot.blocks(segment, True), slot=slot)
+            blocked = changed_where(asked, blocked, blocks, label="suspect")
     return blocked & active
 
 
@@ -74,18 +73,6 @@ def hidden_by_many(
     return blocked & active
 
 
-def _changed_where(lanes: Any, value: Any, change: Callable[[Any], Any]) -> Any:
-    """change(value) in some lanes; packets without one skip it."""
-    (result,) = dr.if_stmt(
-        args=(value,),
-        cond=lanes,
-        true_fn=lambda value: (change(value),),
-        false_fn=lambda value: (value,),
-        label="suspect",
-    )
-    return result
-
-
 def transmittance(
     scene: DeviceScene, segment: Segment, surface: Surface, suspects: Suspects, active: Any
 ) -> Any:
@@ -102,7 +89,7 @@ def transmittance(
             share = passed(share, slot)
     for number, slot in enumerate(scene.spheres):
         asked = active & ((suspects.spheres & (1 << number)) != 0)
-        share = _changed_where(asked, share, partial(passed, slot=slot))
+        share = changed_where(asked, share, partial(passed, slot=slot), label="suspect")
     if scene.sphere_table is not None:
         share = scene.sphere_table.fold(
             segment, share, active & suspects.many, step=passed, done=lambda share: share == 0

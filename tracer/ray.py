@@ -20,7 +20,9 @@ Plain dataclasses with no defaults: frozen ones cannot be loop state, defaults w
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import drjit as dr
@@ -130,6 +132,16 @@ def select_max(a: Any, b: Any) -> Any:
     return dr.select(a > b, a, b)
 
 
+def largest(values: Iterable[Any]) -> Any:
+    """The largest of some numbers."""
+    return reduce(select_max, values)
+
+
+def smallest(values: Iterable[Any]) -> Any:
+    """The smallest of some numbers."""
+    return reduce(select_min, values)
+
+
 def max_abs(v: Any) -> Any:
     """The largest |component| of a 3-vector."""
-    return select_max(select_max(dr.abs(v.x), dr.abs(v.y)), dr.abs(v.z))
+    return largest(dr.abs(c) for c in v)

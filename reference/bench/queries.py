@@ -114,7 +114,7 @@ class Ours:
 def closest_of_neighbors(device: Any, o: Any, d: Any, eye: Any, active: Any) -> Any:
     """Closest hits of rays that start in one eye, as the renderer finds those of its primary rays: in
     bundles."""
-    from tracer.acceleration.bundles import RAYS, Bundles, doubtful_rays, nearest_of_neighbors
+    from tracer.acceleration.bundles import RAYS, Bundles, nearest_of_neighbors, settle_doubtful
     from tracer.intersection import closest_triangle, known_triangle
 
     backend = device.backend
@@ -130,12 +130,12 @@ def closest_of_neighbors(device: Any, o: Any, d: Any, eye: Any, active: Any) -> 
         directions = [backend.Vector3(*(part[k] for part in packet)) for packet in packets for k in range(8)]
         return Bundles(eye, directions, [dr.zeros(backend.Float, dr.width(bundle))] * RAYS)
 
-    first = nearest_of_neighbors(backend, device.triangles, dr.width(d), bundles_of)
-    numbers = doubtful_rays(first)
-    if len(numbers) > 0:
+    def singly(numbers: Any) -> Any:
         ray = free_ray(device, dr.gather(type(o), o, numbers), dr.gather(type(d), d, numbers))
-        found = closest_triangle(device, ray, dr.full(backend.Bool, True, len(numbers)))
-        dr.scatter(first, found.primitive, numbers)
+        return closest_triangle(device, ray, dr.full(backend.Bool, True, len(numbers))).primitive
+
+    first = nearest_of_neighbors(backend, device.triangles, dr.width(d), bundles_of)
+    settle_doubtful(first, singly)
     nothing = no_hit(backend, dr.width(d))
     return known_triangle(device, free_ray(device, o, d), nothing, active, first)
 

@@ -21,7 +21,7 @@ import drjit as dr
 from tracer.acceleration.layout import NodeLists
 from tracer.acceleration.slabs import SMALLEST_COMPONENT
 from tracer.acceleration.triangle import CONTACT_SLACK, Triangle, TriangleTables, fetch_triangle
-from tracer.acceleration.walk import Node, fetch_node, octant_of, walk
+from tracer.acceleration.walk import Node, octant_of, walk, within_root
 from tracer.backends import Backend
 from tracer.ray import max_abs, select_max, select_min
 from tracer.shafts import Shaft
@@ -54,29 +54,23 @@ def first_verdict(
     """The first verdict (n,) of `meet(slot)` on what lies in the boxes that a shaft may cross that is not
     `CLEAR`."""
     slabs = _Slabs.of(backend, lists, shaft)
-    root = fetch_node(backend, lists, slabs.octant * lists.count)
 
-    def look(verdict: Any) -> tuple[Any]:
-        return (
-            walk(
-                backend,
-                lists,
-                slabs.octant,
-                crosses=lambda node, verdict: slabs.crossed(node),
-                test=lambda slot, verdict: meet(slot),
-                state=verdict,
-                done=lambda verdict: verdict != CLEAR,
-            ),
+    def crosses(node: Node, verdict: Any) -> Any:
+        return slabs.crossed(node)
+
+    def look(verdict: Any) -> Any:
+        return walk(
+            backend,
+            lists,
+            slabs.octant,
+            crosses,
+            test=lambda slot, verdict: meet(slot),
+            state=verdict,
+            done=lambda verdict: verdict != CLEAR,
         )
 
-    (verdict,) = dr.if_stmt(
-        args=(dr.full(backend.UInt32, CLEAR, dr.width(shaft.apex)),),
-        cond=active & slabs.crossed(root),
-        true_fn=look,
-        false_fn=lambda verdict: (verdict,),
-        label="beam",
-    )
-    return verdict
+    clear = dr.full(backend.UInt32, CLEAR, dr.width(shaft.apex))
+    return within_root(backend, lists, slabs.octant, crosses, active, clear, look)
 
 
 def _meet(backend: Backend, triangle: Triangle, shaft: Shaft, normal: Any) -> Any:

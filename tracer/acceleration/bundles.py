@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import reduce
 from typing import Any
 
 import drjit as dr
@@ -27,7 +26,7 @@ from tracer.acceleration.layout import NodeLists
 from tracer.acceleration.triangle import Triangle, TriangleTables, fetch_triangle
 from tracer.acceleration.walk import Node, octant_of, walk
 from tracer.backends import INVALID, Backend
-from tracer.ray import max_abs, select_max, select_min
+from tracer.ray import largest, max_abs, select_max, select_min, smallest
 
 RAYS = 16
 """Rays of a bundle: 4 x 4 pixels. 8 share less, for meshes of a triangle a pixel or less."""
@@ -82,9 +81,19 @@ def nearest_of_neighbors(
     return result
 
 
-def doubtful_rays(primitive: Any) -> Any:
-    """Numbers of the rays whose primitive (n,) is `DOUBTFUL`, the last one repeated up to a length that few
-    others differ from, since each length is recorded for itself; empty when there are none."""
+def settle_doubtful(primitive: Any, singly: Callable[[Any], Any]) -> None:
+    """Replaces what is `DOUBTFUL` among the primitives (n,) of rays; `singly(numbers)`: the primitives of
+    single rays by number."""
+    numbers = _doubtful(primitive)
+    if len(numbers) > 0:
+        dr.eval(numbers)
+        dr.scatter(primitive, singly(numbers), numbers)
+        dr.eval(primitive)
+
+
+def _doubtful(primitive: Any) -> Any:
+    """Numbers of the doubtful rays, the last one repeated up to a length that few others differ from, since
+    each length is recorded for itself; empty when there are none."""
     index = type(primitive)
     numbers: Any = dr.compress(primitive == DOUBTFUL)
     n = len(numbers)
@@ -138,7 +147,7 @@ class _Nearest:
 
 def _farthest(rays: list[_Nearest]) -> Any:
     """The least reciprocal distance up to which anything still counts, for some ray."""
-    return reduce(select_min, (ray.low for ray in rays))
+    return smallest(ray.low for ray in rays)
 
 
 @dataclass
@@ -173,7 +182,7 @@ class _Seen:
 
     def by(self, ray: _Nearest, d: Any, latest: Any, primitive: Any) -> _Nearest:
         """What a ray has met first, this triangle included. `latest`: reciprocal distance of its start."""
-        inside = reduce(select_min, (dr.dot(side, d) for side in self.sides))
+        inside = smallest(dr.dot(side, d) for side in self.sides)
         u = dr.dot(self.rate, d)
         low, high = dr.fma(-self.share, u, u), dr.fma(self.share, u, u)
         # Comparisons with NaN are false: what is not known to be missed is possible.
@@ -204,8 +213,8 @@ class _Cones:
     @staticmethod
     def of(backend: Backend, lists: NodeLists, bundles: Bundles) -> _Cones:
         vector = backend.Vector3
-        low = vector(*(reduce(select_min, (d[k] for d in bundles.directions)) for k in range(3)))
-        high = vector(*(reduce(select_max, (d[k] for d in bundles.directions)) for k in range(3)))
+        low = vector(*(smallest(d[k] for d in bundles.directions) for k in range(3)))
+        high = vector(*(largest(d[k] for d in bundles.directions) for k in range(3)))
         mixed = backend.Bool(False)
         for k in range(3):
             mixed = mixed | ~((low[k] > 0) | (high[k] < 0))
@@ -220,7 +229,7 @@ class _Cones:
             rates=tuple(step * inverse for inverse in inverses),
             first=tuple(shift - width for shift in shifts),
             last=tuple(shift + width for shift in shifts),
-            start=reduce(select_min, bundles.starts),
+            start=smallest(bundles.starts),
         )
 
     def crossed(self, node: Node, least: Any) -> Any:

@@ -13,15 +13,14 @@ from that plane is noise. What decides then is geometry that is large compared w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import reduce
 from typing import Any
 
 import drjit as dr
 
 from tracer.acceleration.triangle import Triangle, TriangleTest
-from tracer.ray import Ray, max_abs, select_max
+from tracer.ray import Ray, largest, max_abs, select_max
 
 
 @dataclass
@@ -69,7 +68,7 @@ def meet_near_origin(
     departure: Departure, ray: Ray, triangle: Triangle, test: TriangleTest
 ) -> tuple[Any, Any]:
     """Distance and mask of a doubtful hit, decided as this module's header says."""
-    rise = _largest(dr.dot(departure.normal, v - ray.o) for v in (triangle.v0, triangle.v1, triangle.v2))
+    rise = largest(dr.dot(departure.normal, v - ray.o) for v in (triangle.v0, triangle.v1, triangle.v2))
     through_origin = dr.abs(test.height) <= test.slack
     above = dr.select(through_origin, _side(departure, triangle, test), test.height) > 0
     approaches = dr.select(above, test.speed < 0, test.speed > 0)
@@ -104,12 +103,8 @@ def _side(departure: Departure, triangle: Triangle, test: TriangleTest) -> Any:
     ground = departure.ground()
     offsets = [corner - triangle.v0 for corner in ground.corners]
     heights = [dr.dot(triangle.normal, offset) for offset in offsets]
-    low = -_largest(-height for height in heights) - ground.reach
-    high = _largest(heights) + ground.reach
-    slack = select_max(test.slack, test.relative_slack * _largest(max_abs(offset) for offset in offsets))
+    low = -largest(-height for height in heights) - ground.reach
+    high = largest(heights) + ground.reach
+    slack = select_max(test.slack, test.relative_slack * largest(max_abs(offset) for offset in offsets))
     one_sided = (low >= -slack) | (high <= slack)
     return dr.select(one_sided, low + high, dr.dot(triangle.normal, departure.view))
-
-
-def _largest(values: Iterable[Any]) -> Any:
-    return reduce(select_max, values)

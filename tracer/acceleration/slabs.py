@@ -11,7 +11,7 @@ from tracer.acceleration.layout import NodeLists
 from tracer.acceleration.triangle import Triangle
 from tracer.acceleration.walk import Node, octant_of
 from tracer.backends import Backend
-from tracer.ray import Ray, max_abs, select_max, select_min
+from tracer.ray import Ray, largest, max_abs, select_max, select_min, smallest
 
 SMALLEST_COMPONENT = 1e-20
 """Direction components below this count as this: their reciprocal stays finite, the ray moves by 1e-20 of its
@@ -57,27 +57,22 @@ class Slabs:
         """Mask: the ray meets the widened box of the node in 0 <= t <= limit."""
         near = dr.fma(node.first, self.rate, self.shift_first)
         far = dr.fma(node.last, self.rate, self.shift_last)
-        return _largest(near) <= select_min(_smallest(far), limit)
+        return _entry(near) <= select_min(smallest(far), limit)
 
     def own_span(self, ray: Ray, triangle: Triangle) -> tuple[Any, Any]:
         """Where the ray enters and leaves the box of a triangle."""
         first, last = [], []
         for k, (a, b, c) in enumerate(zip(triangle.v0, triangle.v1, triangle.v2, strict=True)):
-            low, high = select_min(select_min(a, b), c), select_max(select_max(a, b), c)
+            low, high = smallest((a, b, c)), largest((a, b, c))
             negative = (self.octant & (1 << k)) != 0
             first.append(dr.select(negative, high, low))
             last.append(dr.select(negative, low, high))
         vector, margin = type(triangle.v0), OWN_WIDTH * self.width
         near = (vector(*first) - ray.o) * self.inverse - margin
         far = (vector(*last) - ray.o) * self.inverse + margin
-        return _largest(near), _smallest(far)
+        return _entry(near), smallest(far)
 
 
-def _largest(near: Any) -> Any:
+def _entry(near: Any) -> Any:
     """The last entry into a slab, not before 0."""
     return select_max(select_max(near.x, near.y), select_max(near.z, type(near.z)(0)))
-
-
-def _smallest(far: Any) -> Any:
-    """The first exit from a slab."""
-    return select_min(select_min(far.x, far.y), far.z)

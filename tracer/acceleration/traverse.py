@@ -19,8 +19,9 @@ from tracer.acceleration.triangle import (
     meet_triangle,
     projection_axes,
 )
-from tracer.acceleration.walk import fetch_node, walk
+from tracer.acceleration.walk import Node, walk, within_root
 from tracer.backends import Backend
+from tracer.branches import changed_where
 from tracer.ray import Ray, select_max, select_min
 
 GRAZING = 0.25
@@ -50,9 +51,11 @@ def visit_triangles(
     `departure()` too, is not computed for packets without one.
     """
     slabs = Slabs.of(backend, tables.lists, ray)
-    root = fetch_node(backend, tables.lists, slabs.octant * tables.lists.count)
 
-    def visit_all(state: Any) -> tuple[Any]:
+    def crosses(node: Node, state: Any) -> Any:
+        return slabs.crossed(node, limit(state))
+
+    def visit_all(state: Any) -> Any:
         axes, leaving = projection_axes(ray.d), departure()
         rounding = largest_slack(backend.epsilon, ray.o, tables.lists.extent)
 
@@ -88,26 +91,9 @@ def visit_triangles(
             )
             return visit(state, t, primitive, found, valid & other & (t <= limit(state)))
 
-        return (
-            walk(
-                backend,
-                tables.lists,
-                slabs.octant,
-                crosses=lambda node, state: slabs.crossed(node, limit(state)),
-                test=test,
-                state=state,
-                done=done,
-            ),
-        )
+        return walk(backend, tables.lists, slabs.octant, crosses, test, state, done)
 
-    (state,) = dr.if_stmt(
-        args=(state,),
-        cond=active & slabs.crossed(root, limit(state)),
-        true_fn=visit_all,
-        false_fn=lambda state: (state,),
-        label="root",
-    )
-    return state
+    return within_root(backend, tables.lists, slabs.octant, crosses, active, state, visit_all)
 
 
 def distance_to(backend: Backend, lists: NodeLists, ray: Ray, triangle: Triangle) -> Any:
@@ -115,18 +101,10 @@ def distance_to(backend: Backend, lists: NodeLists, ray: Ray, triangle: Triangle
     what `visit_triangles` finds."""
     found = meet_triangle(backend.epsilon, triangle, ray, projection_axes(ray.d))
 
-    def with_care(t: Any) -> tuple[Any]:
-        slabs = Slabs.of(backend, lists, ray)
-        return (_in_own_box(slabs, ray, triangle, t, True)[0],)
+    def within_box(t: Any) -> Any:
+        return _in_own_box(Slabs.of(backend, lists, ray), ray, triangle, t, True)[0]
 
-    (t,) = dr.if_stmt(
-        args=(found.t,),
-        cond=dr.abs(found.speed) < GRAZING,
-        true_fn=with_care,
-        false_fn=lambda t: (t,),
-        label="grazing",
-    )
-    return t
+    return changed_where(dr.abs(found.speed) < GRAZING, found.t, within_box, label="grazing")
 
 
 def _height_of(light: Any, test: TriangleTest) -> Any:

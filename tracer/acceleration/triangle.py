@@ -10,9 +10,7 @@ made in double precision.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import reduce
 from typing import Any
 
 import drjit as dr
@@ -20,7 +18,7 @@ import numpy as np
 
 from tracer.acceleration.layout import NodeLists
 from tracer.backends import Backend
-from tracer.ray import Ray, max_abs, select_max, select_min
+from tracer.ray import Ray, largest, max_abs, select_max, smallest
 from tracer.replay import NOT_IN_KERNELS
 
 TRIANGLE_WORDS = 16
@@ -132,7 +130,7 @@ class TriangleTest:
     @property
     def size(self) -> Any:
         """The largest coordinate of the corners seen from the origin."""
-        return _largest(max_abs(corner) for corner in self.corners)
+        return largest(max_abs(corner) for corner in self.corners)
 
     @property
     def slack(self) -> Any:
@@ -177,11 +175,7 @@ def _edge(start: tuple[Any, Any], end: tuple[Any, Any]) -> Any:
 
 def _extremes(a: Any, b: Any, c: Any) -> tuple[Any, Any]:
     """The smallest and the largest of three."""
-    return select_min(select_min(a, b), c), select_max(select_max(a, b), c)
-
-
-def _largest(values: Iterable[Any]) -> Any:
-    return reduce(select_max, values)
+    return smallest((a, b, c)), largest((a, b, c))
 
 
 def _owns(edge: Any, from_x: Any, from_y: Any, to_x: Any, to_y: Any) -> Any:

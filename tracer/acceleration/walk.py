@@ -17,6 +17,7 @@ import drjit as dr
 
 from tracer.acceleration.layout import FLOAT_WORDS, LEAF, NodeLists
 from tracer.backends import Backend
+from tracer.branches import changed_where
 
 STRIDE = 2
 """Steps between two tests, for rays. 3 are as fast for incoherent ones, slower for shadow rays, which end at
@@ -52,6 +53,21 @@ def octant_of(backend: Backend, d: Any) -> Any:
     for k, component in enumerate(d):
         octant = octant | dr.select(component < 0, backend.UInt32(1 << k), 0)
     return octant
+
+
+def within_root(
+    backend: Backend,
+    lists: NodeLists,
+    octant: Any,
+    crosses: Callable[[Node, Any], Any],
+    active: Any,
+    state: Any,
+    change: Callable[[Any], Any],
+) -> Any:
+    """change(state) where the root's box is crossed, the state elsewhere. Packets that miss it compute
+    nothing of the change: neither the walk nor what only the walk needs."""
+    root = fetch_node(backend, lists, octant * lists.count)
+    return changed_where(active & crosses(root, state), state, change, label="root")
 
 
 def walk(

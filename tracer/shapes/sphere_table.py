@@ -12,7 +12,7 @@ import numpy as np
 from tracer.acceleration.build import build_over_boxes
 from tracer.acceleration.layout import NodeLists, threaded
 from tracer.acceleration.slabs import Slabs
-from tracer.acceleration.walk import fetch_node, walk
+from tracer.acceleration.walk import Node, walk, within_root
 from tracer.backends import Backend
 from tracer.ray import Hit, Ray, Segment
 from tracer.shafts import Ball, ball_around
@@ -95,29 +95,22 @@ class SphereTable:
         """Steps through the spheres whose boxes a ray meets up to `limit(state)`, nearest boxes first."""
         backend, lists = self.backend, self.lists
         slabs = Slabs.of(backend, lists, ray, WIDTH)
-        root = fetch_node(backend, lists, slabs.octant * lists.count)
 
-        def visit_all(state: Any) -> tuple[Any]:
-            return (
-                walk(
-                    backend,
-                    lists,
-                    slabs.octant,
-                    crosses=lambda node, state: slabs.crossed(node, limit(state)),
-                    test=lambda slot, state: step(state, self.fetch(slot)),
-                    state=state,
-                    done=done,
-                ),
+        def crosses(node: Node, state: Any) -> Any:
+            return slabs.crossed(node, limit(state))
+
+        def visit_all(state: Any) -> Any:
+            return walk(
+                backend,
+                lists,
+                slabs.octant,
+                crosses,
+                test=lambda slot, state: step(state, self.fetch(slot)),
+                state=state,
+                done=done,
             )
 
-        (state,) = dr.if_stmt(
-            args=(state,),
-            cond=active & slabs.crossed(root, limit(state)),
-            true_fn=visit_all,
-            false_fn=lambda state: (state,),
-            label="spheres",
-        )
-        return state
+        return within_root(backend, lists, slabs.octant, crosses, active, state, visit_all)
 
     def fetch(self, slot: Any) -> SphereSlot:
         """The sphere in a slot of the hierarchy."""
