@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, BrowserContext, Route
+    from playwright.sync_api import Browser, BrowserContext, Page, Route
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
@@ -48,3 +49,11 @@ def context(browser: Browser) -> Iterator[BrowserContext]:
     yield found
     found.close()
     assert not complaints
+
+
+@pytest.fixture
+def page(context: BrowserContext, file: Path) -> Page:
+    """The page in the `file` of a test module, opened."""
+    opened = context.new_page()
+    opened.goto(file.as_uri())
+    return opened

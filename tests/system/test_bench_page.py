@@ -68,14 +68,6 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.fixture
-def page(context: BrowserContext, file: Path) -> Page:
-    """The page, opened."""
-    opened = context.new_page()
-    opened.goto(file.as_uri())
-    return opened
-
-
 def rows_of(table: Locator) -> list[list[str]]:
     """The texts of the cells."""
     return [row.locator("th, td").all_inner_texts() for row in table.locator("tbody tr").all()]

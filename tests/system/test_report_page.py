@@ -25,14 +25,6 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.fixture
-def page(context: BrowserContext, file: Path) -> Page:
-    """The page, opened."""
-    opened = context.new_page()
-    opened.goto(file.as_uri())
-    return opened
-
-
 def test_a_picture_is_swapped_under_the_mouse_and_kept_by_a_press(page: Page) -> None:
     ours, theirs = page.locator("details[open] .trio").first.locator(".swap").all()
     sources = [button.locator("img").get_attribute("src") for button in (ours, theirs)]

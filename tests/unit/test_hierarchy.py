@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -13,13 +12,21 @@ import pytest
 import tracer
 from tests.accuracy.probe import directions, rotation, unit
 from tests.accuracy.worlds import icosphere
+from tests.unit.node_lists import (
+    Lists,
+    boxes_too_small,
+    damaged,
+    jump_too_far,
+    leaf_one_short,
+    planes_swapped,
+)
 from tracer import device_meshes
 from tracer.acceleration import grid, layout, traverse
 from tracer.acceleration.build import Hierarchy, build_hierarchy
 from tracer.acceleration.grid import find_grid
-from tracer.acceleration.layout import FLOAT_WORDS, GRID_WORDS, LEAF, OCTANTS, NodeLists, threaded
+from tracer.acceleration.layout import LEAF, OCTANTS, threaded
 from tracer.acceleration.subtrees import LARGEST_LEAF, LARGEST_SUBTREE, NODE_COST
-from tracer.backends import Backend, find_backend, thread_count
+from tracer.backends import find_backend, thread_count
 
 Array = np.ndarray
 
@@ -87,50 +94,6 @@ MESHES: dict[str, Callable[[], Array]] = {
 def built(name: str) -> tuple[Array, Hierarchy]:
     corners = MESHES[name]()
     return corners, build_hierarchy(find_backend(), corners)
-
-
-@pytest.fixture(params=["grid", "floats"])
-def form(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Both ways to keep the planes of boxes, whatever suits a mesh."""
-    monkeypatch.setattr(grid, "ROOM", 0)
-    if request.param == "floats":
-        monkeypatch.setattr(layout, "find_grid", lambda tree: None)
-    return request.param
-
-
-@dataclass
-class Lists:
-    """The layout on this side: planes (8 n, 3) in the units of the lists, and links (8 n,)."""
-
-    first: Array
-    last: Array
-    link: Array
-
-    @staticmethod
-    def of(found: NodeLists) -> Lists:
-        words = found.words.numpy()
-        if found.grid is None:
-            rows = words.reshape(-1, FLOAT_WORDS)[:-1]
-            floats = rows.view(np.float32)
-            return Lists(floats[:, 0:3].copy(), floats[:, 4:7].copy(), rows[:, 3].copy())
-        rows = words.reshape(-1, GRID_WORDS)[:-1]
-        return Lists(rows[:, :3] & 0xFFFF, rows[:, :3] >> 16, rows[:, 3].copy())
-
-    def on_device(self, found: NodeLists) -> NodeLists:
-        """The same lists with these words."""
-        if found.grid is None:
-            rows = np.zeros((len(self.link) + 1, FLOAT_WORDS), np.uint32)
-            floats = rows.view(np.float32)
-            floats[:-1, 0:3], floats[:-1, 4:7], rows[:-1, 3] = self.first, self.last, self.link
-        else:
-            rows = np.zeros((len(self.link) + 1, GRID_WORDS), np.uint32)
-            rows[:-1, :3], rows[:-1, 3] = self.first | self.last << 16, self.link
-        return replace(found, words=find_backend().id_table(rows))
-
-    def slots(self, places: list[int]) -> list[int]:
-        """What lies in the leaves among these."""
-        leaves = [int(word) - LEAF for word in self.link[places] if word >= LEAF]
-        return [slot for word in leaves for slot in range(word >> 3, (word >> 3) + (word & 7))]
 
 
 def lists(tree: Hierarchy) -> Lists:
@@ -532,38 +495,11 @@ def test_boxes_never_change_a_hit_of_many_soups(name: str, precision: str, form:
         compare_with_open_boxes(SOUPS[name](seed), seed, 20_000, precision)
 
 
-def jump_too_far(nodes: Lists) -> None:
-    """Every other jump skips a node more."""
-    count = len(nodes.link) // OCTANTS
-    ends = (np.arange(len(nodes.link)) // count + 1) * count
-    further = np.minimum(nodes.link + nodes.link % 2, ends)
-    nodes.link[:] = np.where(nodes.link < LEAF, further, nodes.link)
-
-
-def boxes_too_small(nodes: Lists) -> None:
-    less = 0.01 * (nodes.last.astype(np.float64) - nodes.first)
-    nodes.first[:] = (nodes.first + less).astype(nodes.first.dtype)
-
-
-def planes_swapped(nodes: Lists) -> None:
-    nodes.first[:, 0], nodes.last[:, 0] = nodes.last[:, 0].copy(), nodes.first[:, 0].copy()
-
-
-def leaf_one_short(nodes: Lists) -> None:
-    nodes.link -= ((nodes.link >= LEAF) & (nodes.link & 7 > 1)).astype(np.uint32)
-
-
 @pytest.mark.parametrize("damage", [jump_too_far, boxes_too_small, planes_swapped, leaf_one_short])
 def test_planted_error_is_caught(
     damage: Callable[[Lists], None], monkeypatch: pytest.MonkeyPatch, form: str
 ) -> None:
-    def damaged(backend: Backend, tree: Hierarchy) -> NodeLists:
-        found = threaded(backend, tree)
-        nodes = Lists.of(found)
-        damage(nodes)
-        return nodes.on_device(found)
-
-    monkeypatch.setattr(device_meshes, "threaded", damaged)
+    monkeypatch.setattr(device_meshes, "threaded", damaged(damage))
     with pytest.raises(AssertionError):
         compare_with_all(RAY_MESHES["soup"](), 3, 4000, "double")
     with pytest.raises(AssertionError):

@@ -13,17 +13,16 @@ import pytest
 import tracer
 from tests.accuracy import worlds
 from tests.accuracy.probe import directions, unit
-from tests.unit.test_hierarchy import (
+from tests.unit.node_lists import (
     Lists,
     boxes_too_small,
+    damaged,
     jump_too_far,
     leaf_one_short,
     planes_swapped,
 )
 from tracer import device_scene
-from tracer.acceleration import grid, layout
-from tracer.acceleration.build import Hierarchy
-from tracer.acceleration.layout import NodeLists, threaded
+from tracer.acceleration import layout
 from tracer.backends import INVALID, Backend, exact_arithmetic, find_backend
 from tracer.ray import Ray, Segment, no_hit, normalize
 from tracer.shapes import sphere_table
@@ -246,15 +245,6 @@ def check(heap: Array, seed: int, n: int, precision: str) -> Answers:
     return all_asked
 
 
-@pytest.fixture(params=["grid", "floats"])
-def form(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Both ways to keep the planes of boxes."""
-    monkeypatch.setattr(grid, "ROOM", 0)
-    if request.param == "floats":
-        monkeypatch.setattr(layout, "find_grid", lambda tree: None)
-    return request.param
-
-
 @pytest.mark.parametrize("precision", PRECISIONS)
 @pytest.mark.parametrize("name", HEAPS)
 def test_answers_are_those_of_all_spheres(name: str, precision: str, form: str) -> None:
@@ -283,13 +273,7 @@ def boxes_not_widened(patch: pytest.MonkeyPatch) -> None:
 
 def lists_damaged(damage: Callable[[Lists], None]) -> Callable[[pytest.MonkeyPatch], None]:
     def plant(patch: pytest.MonkeyPatch) -> None:
-        def damaged(backend: Backend, tree: Hierarchy) -> NodeLists:
-            found = threaded(backend, tree)
-            nodes = Lists.of(found)
-            damage(nodes)
-            return nodes.on_device(found)
-
-        patch.setattr(sphere_table, "threaded", damaged)
+        patch.setattr(sphere_table, "threaded", damaged(damage))
 
     return plant
 
