@@ -168,17 +168,23 @@ def _compiled(scene: Scene, backend: Backend) -> DeviceScene:
         ambient=backend.opaque(scene.ambient),
         not_ambient=backend.opaque(1 - scene.ambient),
         background=backend.opaque_vector(decode(np.array(scene.background))),
-        cutoff=backend.opaque(scene.cutoff - 1e-6),
+        cutoff=backend.opaque(weight_floor(scene.cutoff)),
         max_depth=backend.opaque_id(scene.max_depth),
         stack_size=stack_entries(scene.cutoff, scene.max_depth),
         host=host,
     )
 
 
+def weight_floor(cutoff: float) -> float:
+    """Rays that weigh more are traced: those at the cut-off itself are, whatever rounding did to a product of
+    shares."""
+    return cutoff - 1e-6
+
+
 def stack_entries(cutoff: float, max_depth: int) -> int:
     """Room for the pending rays of one pixel: they weigh <= 1 together and >= cutoff each, and one waits a
     level. Few sizes, since each is a kernel of its own: that of the document's cut-off, or a power of two."""
-    needed = min(int(1 / (cutoff - 1e-6)), max_depth)
+    needed = min(int(1 / weight_floor(cutoff)), max_depth)
     return DOCUMENT_STACK if needed <= DOCUMENT_STACK else 1 << (needed - 1).bit_length()
 
 

@@ -16,6 +16,7 @@ from tracer.film.film import Film
 from tracer.film.work_file import WorkFile
 from tracer.llvm import ensure_llvm
 from tracer.scene import Scene
+from tracer.scene.files import file_digests
 from tracer.tiles import Band, Rectangle, after
 from tracer.version import __version__
 
@@ -105,25 +106,30 @@ def identity_of(
         "supersample": n,
         "aov": layers,
     }
-    keys = _flat(scene.to_dict())
+    keys, digests = _flat(scene.to_dict()), file_digests(scene)
     files = {
-        f"{key} (what the file holds)": hashlib.sha256(scene.resolve(value).read_bytes()).hexdigest()
+        f"{key} (what the file holds)": digests[value]
         for key, value in keys.items()
         if key.split(".")[-1] == "file"
     }
-    return settings | keys | files
+    return settings | {key: _short(value) for key, value in keys.items()} | files
 
 
 def _flat(tree: Any, path: str = "") -> dict[str, Any]:
-    """The leaves of a tree of tables and lists of tables, by dotted path; a digest for long ones."""
+    """The leaves of a tree of tables and lists of tables, by dotted path."""
     if isinstance(tree, Mapping):
         pairs = list(tree.items())
     elif isinstance(tree, (list, tuple)) and any(isinstance(part, Mapping) for part in tree):
         pairs = list(enumerate(tree))
     else:
-        text = json.dumps(tree)
-        return {path: tree if len(text) <= _LONG else f"sha256 {hashlib.sha256(text.encode()).hexdigest()}"}
+        return {path: tree}
     leaves: dict[str, Any] = {}
     for name, part in pairs:
         leaves |= _flat(part, f"{path}.{name}" if path else str(name))
     return leaves
+
+
+def _short(value: Any) -> Any:
+    """The value, or a digest that stands for a long one."""
+    text = json.dumps(value)
+    return value if len(text) <= _LONG else f"sha256 {hashlib.sha256(text.encode()).hexdigest()}"

@@ -12,7 +12,7 @@ from tracer.backends import exact_arithmetic, find_backend
 from tracer.canvas import DeviceCanvas
 from tracer.color import decode_srgb
 from tracer.device_meshes import inherited
-from tracer.device_scene import DeviceScene, compile_scene
+from tracer.device_scene import DeviceScene, compile_scene, weight_floor
 from tracer.errors import UsageError
 from tracer.intersection import Surface, closest_hit, surface_at
 from tracer.lens_lights import LightsUnderTheLens, name_of, picked, triple
@@ -177,7 +177,7 @@ class _Lens:
             if kind == "refracted" and total and not self.device.options.tir_reflects:
                 reason = "total reflection"
             else:
-                reason = "cut off" if weight <= self.scene.cutoff - 1e-6 else "too deep"
+                reason = "cut off" if weight <= weight_floor(self.scene.cutoff) else "too deep"
             ended.append(
                 EndedRay("total_reflection" if kind == "refracted" and total else kind, weight, reason)
             )

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import click
 
 from tracer.backends import find_backend
 from tracer.cli.animation_statistics import AnimationStatistics
-from tracer.cli.failures import report, talk
+from tracer.cli.failures import report, talk, worst_of
 from tracer.cli.frame_names import FrameFiles, frame_files
 from tracer.cli.frame_writer import FrameWriter
 from tracer.cli.interruption import Interruption
@@ -25,7 +23,7 @@ from tracer.film.movie import write_movie
 from tracer.film.result import Result
 from tracer.render import render, scene_hash
 from tracer.scene import Scene, find_scene, load
-from tracer.scene.files import records_with_files
+from tracer.scene.files import file_digests
 from tracer.scene_warnings import warnings_of
 from tracer.settings import Settings, picture_canvas, picture_rectangle
 from tracer.version import __version__
@@ -87,14 +85,10 @@ def render_animations(
         else:
             folders.add(files.folder)
             jobs.append(_Job(source, scene, view, files))
-    for job in jobs:
-        try:
-            worst = max(worst, _Animation(job, wishes, course, backend, interruption).make())
-        except Exception as error:
-            interruption.check()
-            worst = max(worst, report(error))
-        interruption.check()
-    return worst
+    made = worst_of(
+        jobs, lambda job: _Animation(job, wishes, course, backend, interruption).make(), interruption
+    )
+    return max(worst, made)
 
 
 class _Animation:
@@ -194,17 +188,13 @@ def _span(template: str, frames: range) -> str:
 def _made_of(job: _Job, wishes: Wishes, backend: str) -> dict[str, Any]:
     """What the frames depend on, by the name that a refusal to go on tells."""
     scene = job.scene
-    contents = {
-        record.file: hashlib.sha256(Path(scene.resolve(record.file)).read_bytes()).hexdigest()
-        for record, _ in records_with_files(scene)
-    }
     free = ("threads", "memory")
     options = {f"--{name}": value for name, value in wishes.settings.items() if name not in free}
     return {
         "version of tracer": __version__,
         "scene": scene_hash(scene),
         "course of the camera": job.view.words,
-        "content of a file of the scene": contents,
+        "content of a file of the scene": file_digests(scene),
         **options,
         "--backend": backend,
         **{f"--{name}": value for name, value in wishes.file_options.items()},

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Iterable
+from typing import TypeVar
 
 import click
 
+from tracer.cli.interruption import Interruption
 from tracer.errors import MachineError, TracerError
+
+Job = TypeVar("Job")
 
 BAD_INPUT = 2
 BUG = 70  # EX_SOFTWARE of sysexits.h
@@ -20,6 +25,20 @@ def report(error: BaseException) -> int:
     if code == BUG and os.environ.get("TRACER_TRACEBACK"):
         raise error
     return code
+
+
+def worst_of(jobs: Iterable[Job], do: Callable[[Job], int], interruption: Interruption) -> int:
+    """Does one job after the other; one that fails is reported and does not stop the rest. Returns the worst
+    exit code."""
+    worst = 0
+    for job in jobs:
+        try:
+            worst = max(worst, do(job))
+        except Exception as error:
+            interruption.check()
+            worst = max(worst, report(error))
+        interruption.check()
+    return worst
 
 
 def talk(text: str) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from tracer.backends import find_backend
-from tracer.cli.failures import report, talk
+from tracer.cli.failures import talk, worst_of
 from tracer.cli.interruption import Interruption
 from tracer.cli.plan import Job, make_plan, partial_file, work_file
 from tracer.cli.progress import make_reporter
@@ -97,16 +97,11 @@ def render_scenes(
         Path(file).suffix.lower() != ".png" for job in plan.jobs for file in job.files
     ):
         warn("the layers of --aov go to .exr and .npz files, and -o names none", wishes)
-    worst = plan.worst
-    for job in plan.jobs:
-        try:
-            worst = max(worst, _Picture(job, wishes, interruption, imported).make())
-        except Exception as error:
-            interruption.check()
-            worst = max(worst, report(error))
-        interruption.check()
-        imported = 0.0
-    return worst
+
+    def make(job: Job) -> int:
+        return _Picture(job, wishes, interruption, imported if job is plan.jobs[0] else 0.0).make()
+
+    return max(plan.worst, worst_of(plan.jobs, make, interruption))
 
 
 class _Picture:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
@@ -23,6 +24,12 @@ def records_with_files(scene: Any) -> Iterator[tuple[Any, tuple[str | int, ...]]
     for number, shape in enumerate(scene.shapes):
         if getattr(shape, "file", None) is not None:
             yield shape, ("shapes", shape.name or number, "file")
+
+
+def file_digests(scene: Any) -> dict[str, str]:
+    """SHA-256 of what each file of a scene holds, by its name in the scene; each is read once."""
+    names = dict.fromkeys(record.file for record, _ in records_with_files(scene))
+    return {name: hashlib.sha256(scene.resolve(name).read_bytes()).hexdigest() for name in names}
 
 
 def locate(file: str, base_dir: Path, allow_outside: bool, *, also: tuple[Path, ...] = ()) -> Path:
