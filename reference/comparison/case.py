@@ -151,8 +151,8 @@ def in_ulp(error: Array, value: Array | None, precision: str) -> Array:
 
 
 def comparable(scene: tracer.Scene) -> tracer.Scene:
-    """The scene with spheres placed, by the plain version, and rounded to single precision, but for those
-    whose texture needs their own frame."""
+    """The scene as it stands still, with spheres placed, by the plain version, and rounded to single
+    precision, but for those whose texture needs their own frame."""
     rows = Truth.of(scene).rows
     shapes = []
     for number, shape in enumerate(scene.shapes):
@@ -161,7 +161,7 @@ def comparable(scene: tracer.Scene) -> tracer.Scene:
             placed = {"center": tuple(center), "radius": radius, "scale": 1.0, "rotate": (0.0,) * 3}
             shape = shape.model_copy(update=placed | {"translate": (0.0,) * 3})
         shapes.append(shape)
-    return scene.model_copy(update={"shapes": shapes})
+    return scene.model_copy(update={"shapes": shapes, "animation": []})
 
 
 def small_picture(scene: tracer.Scene, pixels: int) -> tracer.Scene:
