@@ -23,6 +23,7 @@ from tests.unit.node_lists import (
 from tracer import device_meshes
 from tracer.acceleration import grid, layout, traverse
 from tracer.acceleration.build import Hierarchy, build_hierarchy
+from tracer.acceleration.contraction import WORTH, worth_testing
 from tracer.acceleration.grid import find_grid
 from tracer.acceleration.layout import LEAF, OCTANTS, threaded
 from tracer.acceleration.subtrees import LARGEST_LEAF, LARGEST_SUBTREE, NODE_COST
@@ -209,6 +210,36 @@ def test_the_tree_is_as_good_as_one_cut_node_by_node(name: str) -> None:
     assert expected_cost(tree) == pytest.approx(plain_cost(boxes) / root, rel=0.02)
 
 
+@pytest.mark.parametrize("name", MESHES)
+def test_nodes_are_left_out_whose_boxes_fill_most_of_the_one_above(name: str) -> None:
+    _, tree = built(name)
+    kept = worth_testing(tree)
+    area = half_area(np.stack([tree.lower, tree.upper], axis=1).astype(float))
+    above = np.zeros(len(tree.left), int)  # the nearest kept node
+    for node in np.flatnonzero(tree.left):
+        above[tree.left[node] : tree.left[node] + 2] = node if kept[node] else above[node]
+    inner = np.flatnonzero(tree.left)[1:]
+    assert kept[0] and kept[tree.left == 0].all()
+    assert np.array_equal(kept[inner], area[inner] <= WORTH * area[above[inner]])
+
+
+@pytest.mark.parametrize("name", ["soup", "icosphere", "stack of walls", "two chunks and one"])
+def test_fewer_boxes_are_tested_without_them(name: str) -> None:
+    """Expected for a ray that meets the root: each node is tested when the nearest kept one above is met."""
+    _, tree = built(name)
+    area = half_area(np.stack([tree.lower, tree.upper], axis=1).astype(float))
+
+    def tests(kept: Array) -> float:
+        total, above = area[0], area.copy()
+        for node in np.flatnonzero(tree.left):
+            for child in (tree.left[node], tree.left[node] + 1):
+                total += above[node] if kept[child] else 0
+                above[child] = area[child] if kept[child] else above[node]
+        return float(total / area[0])
+
+    assert tests(worth_testing(tree)) < 0.97 * tests(np.full(len(tree.left), True))
+
+
 def walked(nodes: Lists, octant: int, crosses: Callable[[int], bool]) -> list[int]:
     """The nodes that a kernel visits, by place in the table."""
     count = len(nodes.link) // OCTANTS
@@ -224,21 +255,21 @@ def walked(nodes: Lists, octant: int, crosses: Callable[[int], bool]) -> list[in
 @pytest.mark.parametrize("name", MESHES)
 def test_a_walk_through_all_boxes_meets_each_leaf_once(name: str, form: str) -> None:
     corners, tree = built(name)
-    nodes = lists(tree)
-    assert len(nodes.link) == OCTANTS * len(tree.left)
+    nodes, count = lists(tree), int(worth_testing(tree).sum())
+    assert len(nodes.link) == OCTANTS * count
     for octant in range(OCTANTS):
         visited = walked(nodes, octant, lambda _: True)
-        assert visited == list(range(octant * len(tree.left), (octant + 1) * len(tree.left)))
+        assert visited == list(range(octant * count, (octant + 1) * count))
         assert sorted(nodes.slots(visited)) == list(range(len(corners)))
 
 
 @pytest.mark.parametrize("name", MESHES)
 def test_a_walk_that_misses_the_root_ends_there(name: str, form: str) -> None:
     _, tree = built(name)
-    nodes = lists(tree)
+    nodes, count = lists(tree), int(worth_testing(tree).sum())
     for octant in range(OCTANTS):
         visited = walked(nodes, octant, lambda _: False)
-        assert visited == [octant * len(tree.left) + k for k in range(1 if tree.left[0] else len(visited))]
+        assert visited == [octant * count + k for k in range(1 if tree.left[0] else len(visited))]
 
 
 @pytest.mark.parametrize("name", ["leaf and one", "flat in y", "doubling", "pairs"])
@@ -249,7 +280,7 @@ def test_a_missed_box_is_left_out_with_all_below_it_and_nothing_else(name: str, 
     found = layout.find_grid(tree)
     lower, upper = (tree.lower, tree.upper) if found is None else (found.lower, found.upper)
     rng = np.random.default_rng(1)
-    for node in rng.integers(len(tree.left), size=4):
+    for node in rng.choice(np.flatnonzero(worth_testing(tree)), size=4):
         left_out = np.zeros(len(corners), bool)
         for other in np.flatnonzero(((lower == lower[node]) & (upper == upper[node])).all(axis=1)):
             left_out[tree.first[other] : tree.first[other] + tree.count[other]] = True
@@ -271,7 +302,7 @@ def test_rays_of_an_octant_meet_the_nearer_child_first(form: str) -> None:
         nodes = lists(tree)
         middle = (nodes.first[0, axis] + nodes.last[0, axis]) / 2
         for octant in range(OCTANTS):
-            second = octant * len(tree.left) + 1
+            second = octant * (len(nodes.link) // OCTANTS) + 1
             near_origin = min(nodes.first[second, axis], nodes.last[second, axis]) < middle
             assert near_origin == (octant >> axis & 1 == 0)
 

@@ -39,6 +39,15 @@ class Hierarchy:
     order: np.ndarray
     levels: list[int]
 
+    def families(self) -> list[tuple[np.ndarray, slice]]:
+        """The inner nodes of each level that has some, and where their children lie, side by side."""
+        inner = [begin + np.flatnonzero(self.left[begin:end]) for begin, end in pairwise([0, *self.levels])]
+        return [
+            (nodes, slice(end, end + 2 * len(nodes)))
+            for nodes, end in zip(inner, self.levels, strict=True)
+            if len(nodes)
+        ]
+
 
 def build_hierarchy(backend: Backend, corners: np.ndarray) -> Hierarchy:
     """The hierarchy of n >= 1 triangles with `corners` (n, 3, 3) in single precision numbers.

@@ -2,8 +2,8 @@
 
 A copy lists the nodes depth first, the child that rays of its octant meet first before the other. A ray that
 meets a node's box goes on with the next node of the list, a ray that misses it jumps over the whole subtree:
-no stack. Planes are stored in the order in which those rays cross them (Smits, Efficiency Issues for Ray
-Tracing, 1998).
+no stack. Nodes that are not worth a test are left out (`contraction.py`). Planes are stored in the order in
+which those rays cross them (Smits, Efficiency Issues for Ray Tracing, 1998).
 
 Planes are whole numbers of 16 bits, steps of a grid over the root, rounded outwards (`grid.py`): a node has
 16 bytes. Where the grid is too coarse for a part of the scene, planes stay floats, and a node has 32.
@@ -12,13 +12,13 @@ Planes are whole numbers of 16 bits, steps of a grid over the root, rounded outw
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import drjit as dr
 import numpy as np
 
 from tracer.acceleration.build import Hierarchy
+from tracer.acceleration.contraction import worth_testing
 from tracer.acceleration.grid import Grid, find_grid
 from tracer.backends import Backend
 
@@ -49,15 +49,14 @@ class NodeLists:
 
 def threaded(backend: Backend, tree: Hierarchy) -> NodeLists:
     """The lists of a tree."""
-    sizes = _subtree_sizes(tree)
+    kept = worth_testing(tree)
+    sizes = _subtree_sizes(tree, kept)
     found = find_grid(tree)
     links = np.where(tree.left == 0, LEAF | tree.first << 3 | tree.count, sizes).astype(np.uint32)
-    count = backend.opaque_id(len(tree.left))
-    places = backend.id_table(_places(tree, sizes).T)
-    if found is None:
-        words = _written(backend, backend.id_table(_float_rows(tree, links)), places, count, FLOAT_WORDS)
-    else:
-        words = _written(backend, backend.id_table(found.rows(tree, links)), places, count, GRID_WORDS)
+    rows = _float_rows(tree, links) if found is None else found.rows(tree, links)
+    count = backend.opaque_id(sizes[0])
+    places = backend.id_table(_places(tree, sizes, kept)[kept].T)
+    words = _written(backend, backend.id_table(rows[kept]), places, count, rows.shape[1])
     return NodeLists(
         words=words,
         count=count,
@@ -105,42 +104,33 @@ def _crossed_in_order(octant: Any, words: Any, link: Any) -> list[Any]:
     return [*first, link, *last, words[7]]
 
 
-def _subtree_sizes(tree: Hierarchy) -> np.ndarray:
-    """Nodes of each subtree."""
-    sizes = np.ones(len(tree.left), np.int32)
-    for nodes, below in reversed(_families(tree)):
+def _subtree_sizes(tree: Hierarchy, kept: np.ndarray) -> np.ndarray:
+    """Kept nodes of each subtree."""
+    sizes = kept.astype(np.int32)
+    for nodes, below in reversed(tree.families()):
         sizes[nodes] += sizes[below][0::2] + sizes[below][1::2]
     return sizes
 
 
-def _places(tree: Hierarchy, sizes: np.ndarray) -> np.ndarray:
-    """(n, 8) where each node stands in the list of each octant.
+def _places(tree: Hierarchy, sizes: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """(n, 8) where each node stands in the list of each octant, if it is kept.
 
     Of opposite octants one meets the right child first where the other meets the left one. So its list is the
-    other's read backwards, with parents before their children: n - place - size + depth.
+    other's read backwards, with parents before their children: all - place - size + depth.
     """
     n = len(tree.left)
     place, depth = np.zeros((n, OCTANTS), np.int32), np.zeros((n, 1), np.int32)
+    own = kept[:, None].astype(np.int32)
     negative = np.array([[octant >> k & 1 for octant in range(OCTANTS // 2)] for k in range(3)], bool)
-    for nodes, below in _families(tree):
+    for nodes, below in tree.families():
         center = (tree.lower[below] + tree.upper[below]).reshape(-1, 2, 3)
         apart = center[:, 1] - center[:, 0]
         axis = np.abs(apart).argmax(axis=1)
         left_first = (apart[np.arange(len(nodes)), axis] >= 0)[:, None] != negative[axis]
         size = sizes[below].reshape(-1, 2, 1)
-        begin, children = place[nodes, : OCTANTS // 2] + 1, place[below, : OCTANTS // 2]
+        begin, children = place[nodes, : OCTANTS // 2] + own[nodes], place[below, : OCTANTS // 2]
         children[0::2] = begin + np.where(left_first, 0, size[:, 1])
         children[1::2] = begin + np.where(left_first, size[:, 0], 0)
-        depth[below] = np.repeat(depth[nodes] + 1, 2, axis=0)
-    place[:, OCTANTS // 2 :] = (n - place[:, : OCTANTS // 2] - sizes[:, None] + depth)[:, ::-1]
+        depth[below] = np.repeat(depth[nodes] + own[nodes], 2, axis=0)
+    place[:, OCTANTS // 2 :] = (sizes[0] - place[:, : OCTANTS // 2] - sizes[:, None] + depth)[:, ::-1]
     return place
-
-
-def _families(tree: Hierarchy) -> list[tuple[np.ndarray, slice]]:
-    """The inner nodes of each level that has some, and where their children lie, side by side."""
-    inner = [begin + np.flatnonzero(tree.left[begin:end]) for begin, end in pairwise([0, *tree.levels])]
-    return [
-        (nodes, slice(end, end + 2 * len(nodes)))
-        for nodes, end in zip(inner, tree.levels, strict=True)
-        if len(nodes)
-    ]

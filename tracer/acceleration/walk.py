@@ -19,9 +19,8 @@ from tracer.acceleration.layout import FLOAT_WORDS, LEAF, NodeLists
 from tracer.backends import Backend
 from tracer.branches import changed_where
 
-STRIDE = 2
-"""Steps between two tests, for rays. 3 are as fast for incoherent ones, slower for shadow rays, which end at
-a hit."""
+STRIDE = 3
+"""Steps between two tests, for rays. 2 and 4 are slower by some percent."""
 
 
 @dataclass
