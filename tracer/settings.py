@@ -33,6 +33,7 @@ class Settings:
     seed: int | None = None
     rays_per_band: int = RAYS_PER_BAND
     memory: int | None = None
+    count_hits: bool = False
 
     def checked(self) -> Settings:
         """The settings with AOV names spelled out; raises `UsageError`."""

@@ -65,10 +65,16 @@ class Counts:
 
 @dr.syntax
 def trace_pixels(
-    scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, first: Any, layers: tuple[str, ...] = ()
+    scene: DeviceScene,
+    canvas: DeviceCanvas,
+    pixels: PixelGrid,
+    first: Any,
+    layers: tuple[str, ...] = (),
+    met: Any = None,
 ) -> PixelColumns:
     """The colors, depths and ray counts of pixels, and layers that are sums. `first`: see
-    `first_triangles`."""
+    `first_triangles`. `met` (shapes,): where rays count themselves by the shape that they meet; None where
+    nobody asks."""
     # ---- Loop state, all of it in full width ----
     backend = scene.backend
     width = dr.width(pixels.number)
@@ -88,7 +94,7 @@ def trace_pixels(
     sums = Sums.zero(scene, layers, width)
     active = backend.Bool(pixels.active)
 
-    while dr.hint(active, label="whitted", exclude=[scene, canvas, pixels, first, backend, record]):
+    while dr.hint(active, label="whitted", exclude=[scene, canvas, pixels, first, met, backend, record]):
         # ---- The next sub-ray of the pixel ----
         if dr.hint(fresh, exclude=[scene, canvas, pixels, first, backend, record]):
             path = primary_path(scene, canvas, pixels, sub_ray)
@@ -100,6 +106,8 @@ def trace_pixels(
         surface = surface_at(scene, path.ray, hit, active)
         found = active & hit.valid
         counts.deepest_level = dr.maximum(counts.deepest_level, path.level)
+        if dr.hint(met is not None, mode="scalar"):
+            dr.scatter_add(met, type(met)(1), surface.shape, found)
         closer = is_primary & found & (hit.t < depth)
         hits += dr.select(is_primary & found, backend.UInt32(1), 0)
         depth = dr.select(closer, hit.t, depth)

@@ -216,7 +216,7 @@ def start(folder: Path, variables: dict[str, str], *arguments: str) -> subproces
     )
 
 
-LONG = ("turntable", "classic", "--scale", "0.1", "--frames", "30", "-o", "t.mp4", "-o", "t.npz")
+LONG = ("turntable", "classic", "--scale", "0.1", "--frames", "30", "-o", "t.mp4", "-o", "t.npz", "--stats")
 
 
 @pytest.mark.slow
@@ -235,6 +235,7 @@ def test_ctrl_c_and_kill_lose_no_finished_frame(variables: dict[str, str], tmp_p
         pass
     process.send_signal(signal.SIGINT)
     output, talk = process.communicate(timeout=60)
+    assert not (broken / "t.stats.json").exists()
     told = re.search(r"interrupted: (\d+) of 30 frames of classic are finished; --resume goes on\n$", talk)
     assert (process.returncode, output) == (130, "") and told is not None, talk
     assert len(list(broken.glob("t.*.npz"))) == int(told.group(1)) >= 5
@@ -251,7 +252,14 @@ def test_ctrl_c_and_kill_lose_no_finished_frame(variables: dict[str, str], tmp_p
     assert (process.returncode, talk) == (0, "")
     # Killed in the middle of a movie, a process leaves its temporary file: no other may remove it.
     assert [name for name in names(broken) if not name.startswith(".tracer-")] == names(whole)
+    told, whole_told = (json.loads((folder / "t.stats.json").read_text()) for folder in (broken, whole))
+    assert told["rendered"] < 30 == whole_told["rendered"] and len(whole_told["hits"]) == 14
+    for varies in ("rendered", "seconds", "kernels", "peak_memory"):
+        del told[varies], whole_told[varies]
+    assert told == whole_told
     for name in names(whole):
+        if name.endswith(".json"):
+            continue
         if not name.endswith(".npz"):
             assert (broken / name).read_bytes() == (whole / name).read_bytes(), name
             continue

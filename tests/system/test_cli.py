@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tracer.film.exr import read_exr
 from tracer.film.result import load_picture_file
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
@@ -117,12 +118,46 @@ def test_statistics(tracer: Run) -> None:
     done = tracer("render", "small.toml", "--stats", "--quiet")
     assert done.returncode == 0
     phases = re.match(
-        r"seconds +imports (.*), load .*, tables .*, trace .*, filter .*, write \d", done.stdout
+        r"seconds +imports (.*), load .*, build .*, compile .*, trace .*, filter .*, write \d", done.stdout
     )
     assert phases and 0.05 < float(phases.group(1)) < 30
     assert re.search(r"\nrays +\d+: primary 192, shadow \d+, reflected 0,", done.stdout)
     assert re.search(r"\nkernels +\d+ compiled, \d+ read from the disk cache, \d+ reused", done.stdout)
+    assert re.search(r"\nhits +ball \d+\n", done.stdout)
     assert re.search(r"\npeak memory +\d+ MiB\n$", done.stdout)
+
+
+def test_statistics_as_a_file(tracer: Run, tmp_path: Path) -> None:
+    """What was counted is the same for any number of threads and any memory, so headers hold it."""
+    made = []
+    for folder, option in (("a", ()), ("b", ("--threads", "1", "--memory", "1G"))):
+        (tmp_path / folder).mkdir()
+        files = ("-o", f"{folder}/x.exr", "-o", f"{folder}/y.png")
+        assert tracer("render", "small.toml", "--stats", "--quiet", *files, *option).returncode == 0
+        made.append(json.loads((tmp_path / folder / "x.stats.json").read_text()))
+        assert made[-1]["seconds"].keys() == {
+            "imports",
+            "load",
+            "build",
+            "compile",
+            "trace",
+            "filter",
+            "write",
+        }
+        assert made[-1]["kernels"].keys() == {"compiled", "from_disk", "reused"}
+        assert made[-1]["peak_memory"] > 2**20
+        for varies in ("seconds", "kernels", "peak_memory"):
+            del made[-1][varies]
+    assert made[0] == made[1] and not (tmp_path / "a" / "y.stats.json").exists()
+    counted = made[0]
+    assert counted["rays"]["primary"] == 192
+    assert [(shape["shape"], shape["kind"], shape["name"]) for shape in counted["hits"]] == [
+        (0, "sphere", "ball")
+    ]
+    assert 0 < counted["hits"][0]["hits"] < 192
+    assert (tmp_path / "a" / "x.exr").read_bytes() == (tmp_path / "b" / "x.exr").read_bytes()
+    header = read_exr(tmp_path / "a" / "x.exr")[1]
+    assert header["raysPrimary"] == 192 and header["hitsPerShape"] == str(counted["hits"][0]["hits"])
 
 
 def test_progress_as_json_lines(tracer: Run) -> None:

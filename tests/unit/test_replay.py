@@ -156,7 +156,7 @@ def test_a_tree_comes_back_as_it_was() -> None:
 
 def test_a_frame_is_traced_in_python_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """A moved camera and other numbers replay, with the same bytes as traced anew; another size does not."""
-    module = importlib.import_module("tracer.render")
+    module = importlib.import_module("tracer.launch")
     true, traced = module.trace_pixels, list[int]()
     monkeypatch.setattr(module, "trace_pixels", lambda *arguments: traced.append(1) or true(*arguments))
     scene = tracer.load(worlds.room())

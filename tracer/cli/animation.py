@@ -10,14 +10,16 @@ from typing import Any
 import click
 
 from tracer.backends import find_backend
-from tracer.cli.animation_statistics import AnimationStatistics
+from tracer.cli.animation_statistics import AnimationStatistics, format_animation
 from tracer.cli.failures import report, talk, worst_of
 from tracer.cli.frame_names import FrameFiles, frame_files
 from tracer.cli.frame_writer import FrameWriter
 from tracer.cli.interruption import Interruption
 from tracer.cli.pictures import Wishes, warn
 from tracer.cli.progress import make_reporter
+from tracer.cli.statistics import save_statistics
 from tracer.errors import TracerError, UsageError
+from tracer.film.counts import counts_in
 from tracer.film.frame_record import FrameRecord
 from tracer.film.movie import write_movie
 from tracer.film.result import Result
@@ -99,7 +101,7 @@ class _Animation:
     ) -> None:
         self._job, self._wishes, self._course, self._interruption = job, wishes, course, interruption
         self._record = FrameRecord(job.files.folder, _made_of(job, wishes, backend))
-        self._statistics = AnimationStatistics(wishes.stats)
+        self._statistics = AnimationStatistics()
 
     def make(self) -> int:
         """Renders what is not finished, and the movies; returns the exit code."""
@@ -108,6 +110,8 @@ class _Animation:
             warn(warning, self._wishes)
         self._record.start(self._wishes.resume)
         missing = [frame for frame in frames if not self._record.is_done(frame, files.of(frame))]
+        for frame in set(frames).difference(missing):
+            self._statistics.add_counts(self._record.counts(frame))
         finished = self._render(missing) + len(frames) - len(missing)
         if finished < len(frames):
             return self._stop(f"{finished} of {len(frames)} frames of {self._job.source} are finished")
@@ -148,8 +152,7 @@ class _Animation:
         def progress(done: int, total: int, rays_so_far: int) -> None:
             update(before * total + done, frames * total, rays + rays_so_far)
 
-        with self._statistics.frame():
-            result = render(self._job.view.at(frame), progress=progress, **self._wishes.settings)
+        result = render(self._job.view.at(frame), progress=progress, **self._wishes.settings)
         self._statistics.take(result)
         return result
 
@@ -160,7 +163,7 @@ class _Animation:
         for file in files:
             own = file.parent == self._job.files.folder
             result.save(file, **({} if own else self._wishes.file_options))
-        self._record.add(frame, files)
+        self._record.add(frame, files, counts_in(result.stats))
         self._statistics.written(time.perf_counter() - started)
 
     def _stop(self, what: str) -> int:
@@ -168,11 +171,14 @@ class _Animation:
         return self._interruption.exit_code
 
     def _tell(self, rendered: int) -> None:
+        frames, files = self._course.frames, self._job.files
         if self._wishes.stats:
-            click.echo(self._statistics.text())
+            about = {"scene": self._job.scene.name, "tracer": __version__, "frames": [frames[0], frames[-1]]}
+            statistics = about | self._statistics.summary(self._job.scene)
+            save_statistics(statistics, files.folder.with_suffix(".stats.json"))
+            click.echo(format_animation(statistics))
         if self._wishes.quiet:
             return
-        frames, files = self._course.frames, self._job.files
         names = [*files.movies, *(_span(template, frames) for template in files.pictures)]
         kept = len(frames) - rendered
         were_kept = f" ({kept} were finished before)" if kept else ""
@@ -188,7 +194,7 @@ def _span(template: str, frames: range) -> str:
 def _made_of(job: _Job, wishes: Wishes, backend: str) -> dict[str, Any]:
     """What the frames depend on, by the name that a refusal to go on tells."""
     scene = job.scene
-    free = ("threads", "memory")
+    free = ("threads", "memory", "count_hits")
     options = {f"--{name}": value for name, value in wishes.settings.items() if name not in free}
     return {
         "version of tracer": __version__,

@@ -150,7 +150,12 @@ _PICTURE_OPTIONS = (
     click.option(
         "--resume", is_flag=True, help="Go on with what an earlier run of the same command finished."
     ),
-    click.option("--stats", is_flag=True, help="Tell where the time went, rays by kind, kernels, memory."),
+    click.option(
+        "--stats",
+        is_flag=True,
+        help="Tell where the time went, rays by kind, hits by shape, kernels, memory; also in "
+        "NAME.stats.json.",
+    ),
     click.option("--quiet", is_flag=True, help="Print nothing but errors (and what --stats asks for)."),
     click.option(
         "--progress",

@@ -13,9 +13,14 @@ import click
 from tracer.backends import find_backend
 from tracer.cli.failures import talk, worst_of
 from tracer.cli.interruption import Interruption
-from tracer.cli.plan import Job, make_plan, partial_file, work_file
+from tracer.cli.plan import Job, make_plan, partial_file, statistics_file, work_file
 from tracer.cli.progress import make_reporter
-from tracer.cli.statistics import KernelRecord, format_statistics, seconds_since_start
+from tracer.cli.statistics import (
+    format_statistics,
+    picture_statistics,
+    save_statistics,
+    seconds_since_start,
+)
 from tracer.errors import OutputError
 from tracer.film.result import Result
 from tracer.film.work_file import WorkFile
@@ -63,7 +68,8 @@ class Wishes:
             "seed",
             "memory",
         )
-        return {name: getattr(self, name) for name in names} | {"aovs": ("depth", *self.aovs)}
+        settings = {name: getattr(self, name) for name in names}
+        return settings | {"aovs": ("depth", *self.aovs), "count_hits": self.stats}
 
     @property
     def file_options(self) -> dict[str, Any]:
@@ -120,10 +126,8 @@ class _Picture:
             warn(warning, self._wishes)
         self._tell_of_earlier_work()
         self._seconds["load"] += time.perf_counter() - started
-        kernels = KernelRecord(self._wishes.stats)
         try:
-            with kernels:
-                result = self._trace()
+            result = self._trace()
             writing = time.perf_counter()
             self._save(result)
         except RenderInterrupted as interrupted:
@@ -133,8 +137,8 @@ class _Picture:
             raise OutputError(f"{error}{self._how_to_go_on()}") from error
         finally:
             self._work.close()
-        self._seconds |= _phases(result) | {"write": time.perf_counter() - writing}
-        self._tell(result, kernels, self._job.load_seconds + time.perf_counter() - started)
+        self._seconds |= result.stats["seconds"] | {"write": time.perf_counter() - writing}
+        self._tell(result, self._job.load_seconds + time.perf_counter() - started)
         return 0
 
     def _tell_of_earlier_work(self) -> None:
@@ -171,7 +175,7 @@ class _Picture:
         if self._wishes.resume:
             Path(partial_file(self._job.files[0])).unlink(missing_ok=True)
 
-    def _tell(self, result: Result, kernels: KernelRecord, seconds: float) -> None:
+    def _tell(self, result: Result, seconds: float) -> None:
         lost = result.stats["ended_by_depth"]
         if lost:
             warn(
@@ -180,10 +184,13 @@ class _Picture:
                 self._wishes,
             )
         if self._wishes.stats:
-            click.echo(format_statistics(result.stats, self._seconds, kernels))
+            statistics = picture_statistics(result, self._job.scene, self._seconds)
+            save_statistics(statistics, statistics_file(self._job.files[0]))
+            click.echo(format_statistics(statistics))
         if not self._wishes.quiet:
             height, width = result.depth.shape
-            speed = sum(result.stats["rays"].values()) / max(result.stats["seconds"]["trace"], 1e-9) / 1e6
+            tracing = result.stats["seconds"]["compile"] + result.stats["seconds"]["trace"]
+            speed = sum(result.stats["rays"].values()) / max(tracing, 1e-9) / 1e6
             files = ", ".join(self._job.files)
             click.echo(f"{files}  {width}x{height}  {seconds:.2f} s  {speed:.1f} Mrays/s")
 
@@ -201,12 +208,6 @@ class _Picture:
         if not self._work.started:
             return ""
         return f"; the same command with --resume goes on from {self._work.path}"
-
-
-def _phases(result: Result) -> dict[str, float]:
-    """The seconds of `tracer.render` by phase, under the names of the report."""
-    seconds = result.stats["seconds"]
-    return {"tables": seconds["compile"], "trace": seconds["trace"], "filter": seconds["filter"]}
 
 
 def warn(text: str, wishes: Wishes) -> None:

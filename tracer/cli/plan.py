@@ -103,3 +103,8 @@ def partial_file(file: str) -> str:
 def work_file(file: str) -> str:
     """Where finished bands of a picture are kept: `out/a.work` for `out/a.exr`."""
     return f"{os.path.splitext(file)[0]}.work"
+
+
+def statistics_file(file: str) -> str:
+    """Where the statistics of a picture go: `out/a.stats.json` for `out/a.exr`."""
+    return f"{os.path.splitext(file)[0]}.stats.json"

@@ -1,14 +1,23 @@
-"""`--stats`: where the time went, rays by kind, how paths ended, kernels and memory."""
+"""`--stats`: where the time went, rays by kind, hits by shape, how paths ended, kernels and memory; as text
+and as JSON."""
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from tracer.cli import STARTED
+from tracer.film.atomic import atomic_write
+from tracer.film.counts import counts_in
+from tracer.film.result import Result
+from tracer.scene import Scene
+
+MOST_SHAPES = 8
+"""That the text names; the file has them all."""
 
 
 def seconds_since_start() -> float:
@@ -31,54 +40,91 @@ def peak_memory() -> int | None:
     return peak if sys.platform == "darwin" else peak * 1024
 
 
-class KernelRecord:
-    """Dr.Jit's record of the kernels that ran inside the block; recording costs nothing measurable."""
-
-    def __init__(self, wanted: bool) -> None:
-        self._wanted = wanted
-        self.kernels: list[dict[str, Any]] = []
-
-    def __enter__(self) -> KernelRecord:
-        if self._wanted:
-            import drjit as dr
-
-            dr.kernel_history_clear()
-            dr.set_flag(dr.JitFlag.KernelHistory, True)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._wanted:
-            import drjit as dr
-
-            dr.set_flag(dr.JitFlag.KernelHistory, False)
-            self.kernels = dr.kernel_history([dr.KernelType.JIT])
-
-    def text(self) -> str:
-        """How many were compiled, in which time, and how many were there already."""
-        compiled = [kernel for kernel in self.kernels if not kernel["cache_hit"]]
-        seconds = sum(kernel["codegen_time"] + kernel["backend_time"] for kernel in self.kernels) / 1000
-        disk = sum(bool(kernel["cache_hit"] and kernel["cache_disk"]) for kernel in self.kernels)
-        reused = len(self.kernels) - len(compiled) - disk
-        return (
-            f"{len(compiled)} compiled, {disk} read from the disk cache, {reused} reused; "
-            f"{seconds:.2f} s of the time above"
-        )
+def picture_statistics(result: Result, scene: Scene, seconds: Mapping[str, float]) -> dict[str, Any]:
+    """All that is told of one picture, ready for JSON; `seconds` by phase, in the order in which they
+    passed."""
+    settings = ("supersample", "backend", "precision")
+    return {
+        "scene": result.scene_name,
+        "scene_hash": result.scene_hash,
+        "tracer": result.version,
+        "resolution": list(result.resolution or ()),
+        "crop": list(result.crop or ()),
+        **{name: result.stats[name] for name in settings},
+        **counts_with_names(counts_in(result.stats), scene),
+        "seconds": dict(seconds),
+        "kernels": result.kernels,
+        "peak_memory": peak_memory(),
+    }
 
 
-def format_statistics(stats: dict[str, Any], seconds: dict[str, float], kernels: KernelRecord) -> str:
-    """The report on one picture; `seconds` by phase, in the order in which they passed."""
-    kinds = {kind.replace("_", " "): count for kind, count in stats["rays"].items()}
-    peak = peak_memory()
+def counts_with_names(counts: dict[str, Any], scene: Scene) -> dict[str, Any]:
+    """Counts, `hits` as a list of tables; null where a part of the work was done without counting them."""
+    hits = counts.get("hits")
+    return counts | {
+        "hits": hits
+        and [
+            {"shape": number, "kind": shape.kind, "name": shape.name, "hits": count}
+            for number, (shape, count) in enumerate(zip(scene.shapes, hits, strict=True))
+        ]
+    }
+
+
+def save_statistics(statistics: Mapping[str, Any], file: str | os.PathLike[str]) -> None:
+    """Writes them as JSON; raises `OutputError`."""
+    with atomic_write(file) as temporary:
+        temporary.write_text(json.dumps(statistics, indent=2) + "\n", encoding="utf-8")
+
+
+def format_statistics(statistics: Mapping[str, Any]) -> str:
+    """The report on one picture."""
+    kernels = statistics["kernels"]
     rows = [
-        ("seconds", _listed([f"{phase} {value:.2f}" for phase, value in seconds.items()])),
-        ("rays", f"{sum(kinds.values())}: {_listed([f'{kind} {count}' for kind, count in kinds.items()])}"),
-        ("deepest level", str(stats["deepest_level"])),
-        ("paths ended", f"by weight {stats['ended_by_cutoff']}, by depth {stats['ended_by_depth']}"),
-        ("kernels", kernels.text()),
-        ("peak memory", "unknown" if peak is None else f"{peak / 2**20:.0f} MiB"),
+        ("seconds", _listed(f"{phase} {value:.2f}" for phase, value in statistics["seconds"].items())),
+        *count_rows(statistics),
+        (
+            "kernels",
+            f"{kernels['compiled']} compiled, {kernels['from_disk']} read from the disk cache, "
+            f"{kernels['reused']} reused",
+        ),
+        ("peak memory", in_mebibytes(statistics["peak_memory"])),
     ]
+    return as_table(rows)
+
+
+def count_rows(statistics: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """The rows of a report that say what was counted."""
+    rays = statistics["rays"]
+    kinds = _listed(f"{kind.replace('_', ' ')} {count}" for kind, count in rays.items())
+    return [
+        ("rays", f"{sum(rays.values())}: {kinds}"),
+        ("hits", _most_hit(statistics["hits"])),
+        ("deepest level", str(statistics["deepest_level"])),
+        (
+            "paths ended",
+            f"by weight {statistics['ended_by_cutoff']}, by depth {statistics['ended_by_depth']}",
+        ),
+    ]
+
+
+def _most_hit(hits: Sequence[Mapping[str, Any]] | None) -> str:
+    if hits is None:
+        return "unknown: a part of the work was done without --stats"
+    order = sorted(hits, key=lambda shape: -shape["hits"])
+    shown = [f"{shape['name'] or 'shape {}'.format(shape['shape'])} {shape['hits']}" for shape in order]
+    rest = len(shown) - MOST_SHAPES
+    return _listed([*shown[:MOST_SHAPES], *([f"and {rest} more"] if rest > 0 else [])]) or "none"
+
+
+def as_table(rows: Iterable[tuple[str, str]]) -> str:
+    """Rows of a name and its value."""
     return "\n".join(f"{name:<14}{value}" for name, value in rows)
 
 
-def _listed(parts: Sequence[str]) -> str:
+def in_mebibytes(size: int | None) -> str:
+    """A size in words."""
+    return "unknown" if size is None else f"{size / 2**20:.0f} MiB"
+
+
+def _listed(parts: Iterable[str]) -> str:
     return ", ".join(parts)

@@ -1,8 +1,8 @@
 """Which frames of an animation are finished: a small file beside them, by which `--resume` goes on.
 
 It says of which scene and settings the frames are, and of each finished frame the size and checksum of its
-files. It is replaced whole after every frame, when the frame's files are in place already; a crash in between
-costs that one frame.
+files, and what it took. It is replaced whole after every frame, when the frame's files are in place already;
+a crash in between costs that one frame.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tracer.errors import UsageError
 from tracer.film.atomic import atomic_write
 
 NAME = "frames.json"
-_VERSION = 1
+_VERSION = 2
 _OWN = re.compile(r"frames\.json|\d{4,}\.png|\.tracer-[0-9a-f]{16}(\.json|\.png)")
 """The record, frames for movies, and what a killed process left of them."""
 
@@ -32,7 +32,7 @@ class FrameRecord:
         """`made_of`: plain values that decide what the frames look like, by the name users know."""
         self.folder = folder
         self._made_of = json.loads(json.dumps(made_of))
-        self._frames: dict[str, list[list[Any]]] = {}
+        self._frames: dict[str, dict[str, Any]] = {}
 
     @property
     def file(self) -> Path:
@@ -50,15 +50,20 @@ class FrameRecord:
 
     def is_done(self, frame: int, files: Sequence[Path]) -> bool:
         """Whether all these files of a frame are there as they were written."""
-        entries = {name: (size, crc) for name, size, crc in self._frames.get(str(frame), ())}
         try:
+            entries = {name: (size, crc) for name, size, crc in self._frames[str(frame)]["files"]}
             return all(entries[self._name(file)] == _sum_of(file) for file in files)
         except (KeyError, OSError):
             return False
 
-    def add(self, frame: int, files: Sequence[Path]) -> None:
-        """Notes that the files of a frame are finished; raises `OutputError`."""
-        self._frames[str(frame)] = [[self._name(file), *_sum_of(file)] for file in files]
+    def counts(self, frame: int) -> dict[str, Any]:
+        """What a finished frame took."""
+        return dict(self._frames[str(frame)]["counts"])
+
+    def add(self, frame: int, files: Sequence[Path], counts: Mapping[str, Any]) -> None:
+        """Notes that the files of a frame are finished, and what it took; raises `OutputError`."""
+        sums = [[self._name(file), *_sum_of(file)] for file in files]
+        self._frames[str(frame)] = {"files": sums, "counts": dict(counts)}
         content = {"version": _VERSION, "made of": self._made_of, "frames": self._frames}
         with atomic_write(self.file) as temporary:
             temporary.write_text(json.dumps(content), encoding="utf-8")
@@ -72,7 +77,7 @@ class FrameRecord:
         with suppress(OSError):
             self.folder.rmdir()
 
-    def _read(self) -> dict[str, list[list[Any]]]:
+    def _read(self) -> dict[str, dict[str, Any]]:
         try:
             content = json.loads(self.file.read_text(encoding="utf-8"))
             made_of, frames = content["made of"], content["frames"]

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from tracer.color import decode_srgb, encode_srgb
 from tracer.errors import SceneError
 from tracer.film.atomic import atomic_write, check_writable
+from tracer.film.counts import header_of
 from tracer.film.exr import HeaderValue, Window, read_exr, write_exr
 from tracer.film.layout import RGB, aov_channels, color_channels
 from tracer.film.png import encode_png, write_png
@@ -37,6 +38,7 @@ class Result:
     z: NDArray[np.floating] | None = None  # (h, w), distance from the eye along the view axis, +inf blank
     aovs: dict[str, NDArray] = field(default_factory=dict)  # (h, w) or (h, w, components) by name
     stats: dict[str, Any] = field(default_factory=dict)
+    kernels: dict[str, int] = field(default_factory=dict)  # how many were compiled, read from disk, reused
     scene_name: str = ""
     hash_of: Callable[[], str] = str  # gives `scene_hash` when it is asked for
     version: str = ""
@@ -65,7 +67,7 @@ class Result:
         WRITERS[Path(path).suffix.lower()](self, path, SaveOptions(bits, alpha, half))
 
     def metadata(self) -> dict[str, HeaderValue]:
-        """What the files say about their origin; nothing that changes from run to run."""
+        """What the files say about their origin, and counts; nothing that changes from run to run."""
         return {
             "sceneName": self.scene_name,
             "sceneHash": self.scene_hash,
@@ -73,6 +75,7 @@ class Result:
             "backend": self.backend,
             "precision": self.precision,
             "seed": self.seed,
+            **header_of(self.stats),
         }
 
     def _repr_png_(self) -> bytes:

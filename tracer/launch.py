@@ -1,0 +1,82 @@
+"""One launch: the pixels of a band through the loop, its layers in the order of the picture, its counts."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import drjit as dr
+
+from tracer.aovs import compute_layers
+from tracer.backends import Backend
+from tracer.canvas import DeviceCanvas
+from tracer.device_scene import DeviceScene
+from tracer.pixels import BandPlace, pixels_of
+from tracer.replay import Program
+from tracer.tiles import lane_count
+from tracer.whitted import Counts, trace_pixels
+
+COUNTERS = tuple(f.name for f in fields(Counts))
+
+
+@Program
+def trace_band(
+    device: DeviceScene,
+    canvas: DeviceCanvas,
+    place: BandPlace,
+    size: tuple[int, int],
+    first: Any,
+    layers: tuple[str, ...],
+    shapes: int,
+) -> dict[str, Any]:
+    """The layers of a band of `size` columns and rows, pixels in the order of the picture, components last,
+    and the counters of `COUNTERS` (1,), each under its `count_of`. `first`: see `first_triangles`; `shapes`:
+    how many there are, if the rays that meet each are to be counted as `hits`, else 0."""
+    backend = device.backend
+    pixels = pixels_of(backend, place, size, dr.arange(backend.UInt32, lane_count(*size)))
+    met = dr.opaque(backend.UInt64, 0, shapes) if shapes else None
+    found = trace_pixels(device, canvas, pixels, first, layers, met)
+    values = {"color": found.color, "alpha": found.coverage, "depth": found.depth, "z": found.view_depth}
+    if layers:
+        values |= compute_layers(device, canvas, pixels, found, layers)
+    index = (pixels.row - place.y0) * backend.opaque_id(size[0]) + (pixels.column - place.x0)
+    picture = {name: _scattered(value, index, pixels.active, size) for name, value in values.items()}
+    hits = {} if met is None else {count_of("hits"): met}
+    return picture | _totals(backend, found.counts) | hits
+
+
+def counts_of(found: dict[str, Any]) -> dict[str, Any]:
+    """Takes the counts out of what a launch gives: numbers by name, `hits` a list."""
+    counts = {name: int(found.pop(count_of(name)).numpy()[0]) for name in COUNTERS}
+    hits = found.pop(count_of("hits"), None)
+    return counts if hits is None else counts | {"hits": hits.numpy().tolist()}
+
+
+def count_of(name: str) -> str:
+    """The name of a counter among the layers, some of which are called alike."""
+    return f"number of {name}"
+
+
+def _scattered(value: Any, index: Any, active: Any, size: tuple[int, int]) -> Any:
+    """Values of lanes (components, n) in the order of the picture, components last.
+
+    Each pixel is written by the one lane that owns it: no atomics.
+    """
+    components = list(value) if isinstance(value, list) or dr.depth_v(value) > 1 else [value]
+    target = dr.empty(type(components[0]), size[0] * size[1] * len(components))
+    for k, component in enumerate(components):
+        dr.scatter(target, component, index * len(components) + k, active, mode=dr.ReduceMode.Permute)
+    return target
+
+
+def _totals(backend: Backend, counts: Counts) -> dict[str, Any]:
+    """Sums over the lanes of a launch, 64 bits wide; of the levels the largest.
+
+    Whole numbers, so the order in which the lanes add them makes no difference.
+    """
+    totals = {count_of(name): dr.zeros(backend.UInt64, 1) for name in COUNTERS}
+    for name in COUNTERS:
+        op = dr.ReduceOp.Max if name == "deepest_level" else dr.ReduceOp.Add
+        lanes = backend.UInt64(getattr(counts, name))
+        dr.scatter_reduce(op, totals[count_of(name)], lanes, backend.UInt32(0))
+    return totals
