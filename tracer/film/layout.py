@@ -46,12 +46,13 @@ def aov_channels(aovs: Mapping[str, NDArray]) -> dict[str, NDArray]:
         if stored.ndim == 2:
             channels[name] = stored
             continue
-        for k, component in enumerate(_components(name, stored.shape[2])):
+        for k, component in enumerate(component_names(name, stored.shape[2])):
             channels[f"{name}.{component}"] = stored[..., k]
     return channels
 
 
-def _components(name: str, count: int) -> tuple[str, ...]:
+def component_names(name: str, count: int) -> tuple[str, ...]:
+    """The names of the `count` components of a layer."""
     if name == VISIBILITY:
         return tuple(f"light{k}" for k in range(count))
     return COMPONENTS.get(name) or tuple(str(k) for k in range(count))
