@@ -168,7 +168,7 @@ def test_resume_keeps_what_belongs_to_it(
     tracer: Run, variables: dict[str, str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """A movie that could not be written leaves its frames; the next run renders only what is missing."""
-    turn = ("turntable", "balls.toml", "--frames", "4", "-o", "t.mp4")
+    turn = ("turntable", "balls.toml", "--frames", "4", "-o", "t.mp4", "--aov-png")
     assert tracer(*turn).returncode == 0
     whole = (tmp_path / "t.mp4").read_bytes()
 
@@ -181,6 +181,7 @@ def test_resume_keeps_what_belongs_to_it(
     assert kept == [*(f"000{k}.png" for k in range(1, 5)), "frames.json"]
     (tmp_path / "t.frames" / "0003.png").write_bytes(b"damaged")
     (tmp_path / "t.frames" / "0001.png").unlink()
+    (tmp_path / "t.0004.depth.png").unlink()
     before = (tmp_path / "t.frames" / "0002.png").stat().st_mtime_ns
 
     for option, what in (
@@ -193,9 +194,9 @@ def test_resume_keeps_what_belongs_to_it(
         assert done.returncode == 2 and f"have another {what} than" in done.stderr, done.stderr
     assert (tmp_path / "t.frames" / "0002.png").stat().st_mtime_ns == before
     done = tracer(*turn, "--resume")
-    assert done.returncode == 0 and "4 frames (2 were finished before)" in done.stdout
+    assert done.returncode == 0 and "4 frames (1 was finished before)" in done.stdout
     assert (tmp_path / "t.mp4").read_bytes() == whole
-    assert names(tmp_path) == ["t.mp4"]
+    assert names(tmp_path) == [*(f"t.000{k}.depth.png" for k in range(1, 5)), "t.mp4"]
 
 
 def test_a_folder_of_the_same_name_is_left_alone(tracer: Run, tmp_path: Path) -> None:

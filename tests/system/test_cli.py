@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tracer import load, pixel_tree
 from tracer.film.exr import read_exr
 from tracer.film.result import load_picture_file
 
@@ -403,6 +404,19 @@ def test_one_pixel_under_the_lens(tracer: Run, tmp_path: Path) -> None:
 )
 def test_one_pixel_is_no_picture(tracer: Run, more: tuple[str, str], message: str) -> None:
     assert_refused(tracer("render", "small.toml", "--pixel", "8", "6", *more), message)
+
+
+def test_one_pixel_as_json(tracer: Run, tmp_path: Path) -> None:
+    (tmp_path / "other.toml").write_text(SMALL_SCENE.replace("radius = 6", "radius = 5"))
+    done = tracer(
+        "render", "small.toml", "other.toml", "--pixel", "8", "6", "--precision", "double", "--json"
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    trees = [json.loads(line) for line in done.stdout.splitlines()]
+    scenes = [load(tmp_path / name) for name in ("small.toml", "other.toml")]
+    expected = [pixel_tree(scene, 8, 6, precision="double").to_dict() for scene in scenes]
+    assert trees == json.loads(json.dumps(expected))
+    assert_refused(tracer("render", "small.toml", "--json"), "--json: .* with --pixel")
 
 
 def test_a_pixel_outside_the_picture_is_refused(tracer: Run) -> None:

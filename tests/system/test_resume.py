@@ -30,8 +30,9 @@ OPTIONS = (
     "--aov",
     "normal",
     "--stats",
+    "--aov-png",
 )
-"""A picture of a few seconds in bands of 32 rows."""
+"""A picture of a few seconds in bands of 32 rows, with two pictures of layers."""
 
 VARIES = ("seconds", "kernels", "peak_memory")
 """Statistics that are those of a run, not of the picture."""

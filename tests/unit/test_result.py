@@ -57,6 +57,20 @@ def read(path) -> tuple[dict[str, np.ndarray], dict]:
     return {name: channel.pixels for name, channel in file.channels().items()}, file.header()
 
 
+def test_pictures_of_layers(result, tmp_path):
+    files = result.save_layers(tmp_path / "a.exr")
+    layers = [*result.aovs]
+    layers[layers.index("visibility")] = "visibility.light0"
+    layers.insert(layers.index("visibility.light0") + 1, "visibility.light1")
+    assert files == [tmp_path / f"a.{layer}.png" for layer in layers]
+    assert cv2.imread(str(files[-1]))[..., ::-1].tobytes() == quantize(result.aovs["refracted"]).tobytes()
+    result.color_space = "linear"
+    (encoded,) = (file for file in result.save_layers(tmp_path / "b.png") if "diffuse" in file.name)
+    assert np.array_equal(
+        cv2.imread(str(encoded))[..., ::-1], quantize(encode_srgb(result.aovs["diffuse"]))
+    ), "as the picture, not linear"
+
+
 def test_exr_layout(result, tmp_path):
     result.save(tmp_path / "a.exr")
     channels, header = read(tmp_path / "a.exr")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import click
@@ -15,11 +15,13 @@ from tracer.cli.failures import report, talk, worst_of
 from tracer.cli.frame_names import FrameFiles, frame_files
 from tracer.cli.frame_writer import FrameWriter
 from tracer.cli.interruption import Interruption
+from tracer.cli.layers import LOST_LAYERS, loses_layers, told_layers
 from tracer.cli.pictures import Wishes, warn
 from tracer.cli.progress import make_reporter
 from tracer.cli.statistics import save_statistics
 from tracer.errors import TracerError, UsageError
 from tracer.film.counts import counts_in
+from tracer.film.false_color import picture_names
 from tracer.film.frame_record import FrameRecord
 from tracer.film.movie import write_movie
 from tracer.film.result import Result
@@ -71,6 +73,8 @@ def render_animations(
     checked = Settings(**wishes.settings).checked()
     backend = find_backend(wishes.backend, wishes.precision).name
     templates = wishes.outputs or (default_output,)
+    if not wishes.aov_png and loses_layers(wishes.aovs, templates):
+        warn(LOST_LAYERS, wishes)
     worst, jobs, folders = 0, [], set()
     for source in sources:
         try:
@@ -79,6 +83,8 @@ def render_animations(
                 raise UsageError(f"{templates[0]}: {{name}} in it gives each scene files of its own")
             scene = load(source, allow_outside=wishes.allow_outside, overrides=wishes.overrides)
             picture_rectangle(checked.crop, picture_canvas(scene, checked))
+            if wishes.aov_png:
+                files = replace(files, layers=tuple(picture_names(checked.aovs, len(scene.lights))))
             view = view_of(scene)
             for frame in course.frames:
                 view.at(frame)  # values that do not fit together are told before the first ray
@@ -109,7 +115,7 @@ class _Animation:
         for warning in warnings_of(self._job.scene):
             warn(warning, self._wishes)
         self._record.start(self._wishes.resume)
-        missing = [frame for frame in frames if not self._record.is_done(frame, files.of(frame))]
+        missing = [frame for frame in frames if not self._record.is_done(frame, files.all_of(frame))]
         for frame in set(frames).difference(missing):
             self._statistics.add_counts(self._record.counts(frame))
         finished = self._render(missing) + len(frames) - len(missing)
@@ -163,7 +169,9 @@ class _Animation:
         for file in files:
             own = file.parent == self._job.files.folder
             result.save(file, **({} if own else self._wishes.file_options))
-        self._record.add(frame, files, counts_in(result.stats))
+        if self._job.files.layers:
+            result.save_layers(self._job.files.layer_base(frame))
+        self._record.add(frame, self._job.files.all_of(frame), counts_in(result.stats))
         self._statistics.written(time.perf_counter() - started)
 
     def _stop(self, what: str) -> int:
@@ -180,8 +188,9 @@ class _Animation:
         if self._wishes.quiet:
             return
         names = [*files.movies, *(_span(template, frames) for template in files.pictures)]
+        names += told_layers(str(files.layer_base(frames[0])), files.layers)
         kept = len(frames) - rendered
-        were_kept = f" ({kept} were finished before)" if kept else ""
+        were_kept = f" ({kept} {'was' if kept == 1 else 'were'} finished before)" if kept else ""
         click.echo(f"{', '.join(names)}  {len(frames)} frames{were_kept}  {self._statistics.speed()}")
 
 

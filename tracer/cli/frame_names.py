@@ -11,6 +11,7 @@ from pathlib import Path
 from tracer.errors import UsageError
 from tracer.film.atomic import OUTPUT_SUFFIXES, check_writable, fill_template
 from tracer.film.movie import MOVIE_SUFFIXES, find_ffmpeg
+from tracer.film.result import layer_file
 
 LARGEST_FRAME = 10_000_000
 FIELD = "{frame:04d}"
@@ -35,12 +36,13 @@ def read_frames(text: str) -> range:
 
 @dataclass(frozen=True)
 class FrameFiles:
-    """The files of an animation: templates of `pictures` that lack only the frame, `movies`, and the `folder`
-    of what is kept until the end."""
+    """The files of an animation: templates of `pictures` that lack only the frame, `movies`, the `folder` of
+    what is kept until the end, and which `layers` become pictures."""
 
     pictures: tuple[str, ...]
     movies: tuple[str, ...]
     folder: Path
+    layers: tuple[str, ...] = ()
 
     def of(self, frame: int) -> list[Path]:
         """The files of one frame; the first PNG is the one that goes into movies."""
@@ -48,6 +50,16 @@ class FrameFiles:
         if self.movies and not any(file.suffix.lower() == ".png" for file in files):
             files.append(self.folder / f"{frame:04d}.png")
         return files
+
+    def layer_base(self, frame: int) -> Path:
+        """The name beside which the pictures of a frame's layers stand; that of a movie gets a number."""
+        if not self.pictures:
+            return Path(self.movies[0]).with_suffix(f".{frame:04d}.png")
+        return Path(self.pictures[0].format(frame=frame))
+
+    def all_of(self, frame: int) -> list[Path]:
+        """The files of one frame, those of its layers included."""
+        return [*self.of(frame), *(layer_file(self.layer_base(frame), layer) for layer in self.layers)]
 
     def movie_frame(self, frame: int) -> Path:
         """The picture of a frame that goes into movies."""

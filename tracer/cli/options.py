@@ -140,6 +140,11 @@ _PICTURE_OPTIONS = (
         help="A layer for .exr and .npz, or `all`. Repeatable.",
     ),
     click.option(
+        "--aov-png",
+        is_flag=True,
+        help="Each layer in false colors, as NAME.LAYER.png; the depth without --aov.",
+    ),
+    click.option(
         "--bits", type=click.Choice(("8", "16")), default="8", show_default=True, help="Bits of a PNG."
     ),
     click.option("--alpha", is_flag=True, help="Coverage as a fourth channel of a PNG."),

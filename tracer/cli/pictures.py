@@ -13,6 +13,7 @@ import click
 from tracer.backends import find_backend
 from tracer.cli.failures import talk, worst_of
 from tracer.cli.interruption import Interruption
+from tracer.cli.layers import LOST_LAYERS, loses_layers, told_layers
 from tracer.cli.plan import Job, make_plan, partial_file, statistics_file, work_file
 from tracer.cli.progress import make_reporter
 from tracer.cli.statistics import (
@@ -44,6 +45,7 @@ class Wishes:
     backend: str
     threads: int | None
     aovs: tuple[str, ...]
+    aov_png: bool
     bits: str
     alpha: bool
     half: bool
@@ -95,14 +97,12 @@ def render_scenes(
 
     interruption.quiet = wishes.quiet
     imported = seconds_since_start()
-    plan = make_plan(sources, wishes.outputs, load_scene or load_source, wishes.settings)
+    plan = make_plan(sources, wishes.outputs, load_scene or load_source, wishes.settings, wishes.aov_png)
     if not plan.jobs:
         return plan.worst
     find_backend(wishes.backend, wishes.precision)
-    if wishes.aovs and not any(
-        Path(file).suffix.lower() != ".png" for job in plan.jobs for file in job.files
-    ):
-        warn("the layers of --aov go to .exr and .npz files, and -o names none", wishes)
+    if not wishes.aov_png and loses_layers(wishes.aovs, [file for job in plan.jobs for file in job.files]):
+        warn(LOST_LAYERS, wishes)
 
     def make(job: Job) -> int:
         return _Picture(job, wishes, interruption, imported if job is plan.jobs[0] else 0.0).make()
@@ -171,6 +171,8 @@ class _Picture:
         """Writes the files, after which what an interrupted run left has done its service."""
         for file in self._job.files:
             result.save(file, **self._wishes.file_options)
+        if self._wishes.aov_png:
+            result.save_layers(self._job.files[0])
         self._work.remove()
         if self._wishes.resume:
             Path(partial_file(self._job.files[0])).unlink(missing_ok=True)
@@ -191,7 +193,7 @@ class _Picture:
             height, width = result.depth.shape
             tracing = result.stats["seconds"]["compile"] + result.stats["seconds"]["trace"]
             speed = sum(result.stats["rays"].values()) / max(tracing, 1e-9) / 1e6
-            files = ", ".join(self._job.files)
+            files = ", ".join((*self._job.files, *told_layers(self._job.files[0], self._job.layers)))
             click.echo(f"{files}  {width}x{height}  {seconds:.2f} s  {speed:.1f} Mrays/s")
 
     def _save_partial(self, partial: Result) -> None:

@@ -1,7 +1,8 @@
-"""`tracer render SCENE --pixel X Y`: the tree of rays of one pixel, as text."""
+"""`tracer render SCENE --pixel X Y`: the tree of rays of one pixel, as text or as JSON."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -15,8 +16,8 @@ if TYPE_CHECKING:
     from tracer.ray_tree import EndedRay, HitPoint, LightTerm, PixelTree, RayNode
 
 
-def show_pixels(sources: Sequence[str], pixel: tuple[int, int], wishes: Wishes) -> int:
-    """Prints the tree of the pixel in each scene, and returns the worst exit code."""
+def show_pixels(sources: Sequence[str], pixel: tuple[int, int], wishes: Wishes, as_json: bool = False) -> int:
+    """Prints the tree of the pixel in each scene, and returns the worst exit code; `as_json`: a line each."""
     from tracer.lens import pixel_tree
     from tracer.scene import load
 
@@ -31,6 +32,9 @@ def show_pixels(sources: Sequence[str], pixel: tuple[int, int], wishes: Wishes) 
             tree = pixel_tree(scene, *pixel, **settings)
         except TracerError as error:
             worst = max(worst, report(error))
+            continue
+        if as_json:
+            click.echo(json.dumps(tree.to_dict()))
             continue
         click.echo("\n".join(lines_of(tree)))
         lens = scene.camera.depth_of_field

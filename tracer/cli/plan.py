@@ -11,6 +11,8 @@ from typing import Any
 from tracer.cli.failures import report
 from tracer.errors import OutputError, TracerError, UsageError
 from tracer.film.atomic import check_writable, fill_template
+from tracer.film.false_color import picture_names
+from tracer.film.result import layer_file
 from tracer.scene import Scene, find_scene
 from tracer.settings import Settings, picture_canvas, picture_rectangle
 
@@ -25,6 +27,7 @@ class Job:
     scene: Scene
     files: tuple[str, ...]
     load_seconds: float
+    layers: tuple[str, ...] = ()  # names of the layers that become pictures as well
 
 
 @dataclass
@@ -44,30 +47,37 @@ def make_plan(
     templates: Sequence[str],
     load_scene: Callable[[str], Scene],
     settings: dict[str, Any],
+    aov_png: bool = False,
 ) -> Plan:
-    """Loads and checks all scenes, each with `load_scene`; a bad one is reported and left out.
+    """Loads and checks all scenes, each with `load_scene`; a bad one is reported and left out. `aov_png`:
+    whether layers become pictures.
 
     Raises `UsageError` or `OutputError` for what concerns them all: options, files that cannot be written.
     """
     checked = Settings(**settings).checked()
     plan = Plan([])
-    files = _output_files(sources, templates or (DEFAULT_OUTPUT,), plan)
+    owners: dict[str, str] = {}
+    files = _output_files(sources, templates or (DEFAULT_OUTPUT,), plan, owners)
     for source in files:
         started = time.perf_counter()
         try:
             scene = load_scene(source)
             picture_rectangle(checked.crop, picture_canvas(scene, checked))
+            layers = picture_names(checked.aovs, len(scene.lights)) if aov_png else ()
+            for layer in layers:
+                _claim(str(layer_file(files[source][0], layer)), source, owners)
         except TracerError as error:
             plan.refuse(error)
         else:
-            plan.jobs.append(Job(source, scene, files[source], time.perf_counter() - started))
+            plan.jobs.append(Job(source, scene, files[source], time.perf_counter() - started, tuple(layers)))
     return plan
 
 
-def _output_files(sources: Sequence[str], templates: Sequence[str], plan: Plan) -> dict[str, tuple[str, ...]]:
-    """The files of every scene that exists; each file belongs to one scene and can be written."""
+def _output_files(
+    sources: Sequence[str], templates: Sequence[str], plan: Plan, owners: dict[str, str]
+) -> dict[str, tuple[str, ...]]:
+    """The files of every scene that exists; each file belongs to one scene (`owners`) and can be written."""
     files: dict[str, tuple[str, ...]] = {}
-    owners: dict[str, str] = {}
     for source in sources:
         try:
             name = find_scene(source)[0].stem
@@ -77,11 +87,11 @@ def _output_files(sources: Sequence[str], templates: Sequence[str], plan: Plan) 
         files[source] = tuple(fill_template(template, name) for template in templates)
         for file in files[source]:
             _claim(file, source, owners)
-            check_writable(file)
     return files
 
 
 def _claim(file: str, source: str, owners: dict[str, str]) -> None:
+    """Gives a file that can be written to a scene."""
     real = os.path.realpath(file)
     if real in owners:
         other = owners[real]
@@ -90,6 +100,7 @@ def _claim(file: str, source: str, owners: dict[str, str]) -> None:
             f"{file}: would be written {who}; allowed: a file of its own each, such as -o {{name}}.png"
         )
     owners[real] = source
+    check_writable(file)
 
 
 def partial_file(file: str) -> str:

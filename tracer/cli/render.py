@@ -28,6 +28,7 @@ from tracer.errors import UsageError
     metavar="X Y",
     help="Print the tree of rays of a pixel instead of rendering.",
 )
+@click.option("--json", "as_json", is_flag=True, help="With --pixel: print the tree as JSON.")
 @click.pass_obj
 def render(
     interruption: Interruption,
@@ -35,6 +36,7 @@ def render(
     frames: str | None,
     fps: float,
     pixel: tuple[int, int] | None,
+    as_json: bool,
     **options: Any,
 ) -> int:
     """Render each SCENE, a .toml file or a built-in name (see `tracer scenes`).
@@ -71,7 +73,9 @@ def render(
 
         if frames is not None:
             raise UsageError("--pixel: shows one picture; leave out --frames")
-        return show_pixels(scenes, pixel, wishes)
+        return show_pixels(scenes, pixel, wishes, as_json)
+    if as_json:
+        raise UsageError("--json: shows the rays of a pixel; allowed: with --pixel")
     if frames is None:
         return render_scenes(scenes, wishes, interruption)
 

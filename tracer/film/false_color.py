@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 
@@ -125,14 +125,20 @@ def color_map(layer: str) -> NDArray[np.uint8]:
     return np.ascontiguousarray(cv2.applyColorMap(steps, MAPS[_layer_of(layer)])[:, 0, ::-1])
 
 
+def picture_names(layers: Iterable[str], lights: int) -> list[str]:
+    """The names of the pictures of layers: the visibility has one for each light, and none without lights."""
+    parts = [f"{VISIBILITY}.{component}" for component in component_names(VISIBILITY, lights)]
+    return [name for layer in layers for name in (parts if layer == VISIBILITY else [layer])]
+
+
 def pictures_of(layers: Mapping[str, NDArray]) -> Iterator[tuple[str, NDArray]]:
-    """Layers by name, as `false_color` takes them: the visibility is one for each light."""
-    for name, values in layers.items():
-        if name != VISIBILITY:
-            yield name, values
-            continue
-        for k, component in enumerate(component_names(name, values.shape[2])):
-            yield f"{name}.{component}", values[..., k]
+    """Layers by name, as `false_color` takes them, under their `picture_names`."""
+    for layer, values in layers.items():
+        if layer == VISIBILITY:
+            lights = values.shape[2]
+            yield from zip(picture_names([layer], lights), np.moveaxis(values, 2, 0), strict=True)
+        else:
+            yield layer, values
 
 
 def _layer_of(name: str) -> str:

@@ -32,7 +32,8 @@ FAST = [
 def write_png(path: str | os.PathLike[str], image: NDArray, bits: int = 8) -> None:
     """Writes display-referred values (h, w), (h, w, 3) or (h, w, 4) as a PNG of `bits` = 8 or 16.
 
-    0 to 1 becomes 0 to 2^bits - 1 by `tracer.color.quantize`; a fourth channel is alpha, not premultiplied.
+    0 to 1 becomes 0 to 2^bits - 1 by `tracer.color.quantize`, bytes stay as they are (`bits` = 8); a fourth
+    channel is alpha, not premultiplied.
     Raises OutputError where the file cannot be written.
     """
     parts = _parts(image, bits)
@@ -55,7 +56,7 @@ def _parts(image: NDArray, bits: int) -> list[bytes | memoryview]:
 def _encode(image: NDArray, bits: int) -> NDArray[np.uint8]:
     if image.ndim not in (2, 3) or (image.ndim == 3 and image.shape[2] not in (3, 4)) or image.size == 0:
         raise ValueError(f"image has shape {image.shape}; allowed: (h, w), (h, w, 3), (h, w, 4), not empty")
-    pixels = quantize(image, bits)
+    pixels = image.copy() if image.dtype == np.uint8 else quantize(image, bits)
     if image.ndim == 3:
         swap = cv2.COLOR_RGB2BGR if image.shape[2] == 3 else cv2.COLOR_RGBA2BGRA
         cv2.cvtColor(pixels, swap, dst=pixels)  # in place: OpenCV's order is blue, green, red

@@ -23,7 +23,9 @@ from tracer.errors import SceneError
 from tracer.film.atomic import atomic_write, check_writable
 from tracer.film.counts import header_of
 from tracer.film.exr import HeaderValue, Window, read_exr, write_exr
+from tracer.film.false_color import false_color, pictures_of
 from tracer.film.layout import RGB, aov_channels, color_channels
+from tracer.film.legend import with_legend
 from tracer.film.png import encode_png, write_png
 from tracer.textures.picture import read_picture
 
@@ -66,6 +68,16 @@ class Result:
         check_writable(path)
         WRITERS[Path(path).suffix.lower()](self, path, SaveOptions(bits, alpha, half))
 
+    def save_layers(self, path: str | os.PathLike[str]) -> list[Path]:
+        """Writes each layer of `aovs` as a picture in false colors with a legend, `a.LAYER.png` for `a.png`
+        and `a.exr` alike. Returns the files; raises OutputError."""
+        files = []
+        for name, values in pictures_of(self.aovs):
+            image = false_color(name, values, self.color_space == "linear")
+            files.append(layer_file(path, name))
+            write_png(files[-1], with_legend(image, name, values))
+        return files
+
     def metadata(self) -> dict[str, HeaderValue]:
         """What the files say about their origin, and counts; nothing that changes from run to run."""
         return {
@@ -80,6 +92,11 @@ class Result:
 
     def _repr_png_(self) -> bytes:
         return encode_png(self.color)
+
+
+def layer_file(path: str | os.PathLike[str], layer: str) -> Path:
+    """The file of a layer's picture: `out/a.normal.png` beside `out/a.exr`."""
+    return Path(path).with_suffix(f".{layer}.png")
 
 
 @dataclass(frozen=True)
