@@ -17,6 +17,7 @@ import numpy as np
 
 from tracer.errors import MachineError, UsageError
 from tracer.llvm import ensure_llvm
+from tracer.subnormals import flushed_subnormals
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -146,8 +147,9 @@ def exact_arithmetic() -> Iterator[None]:
     """Division, square root and products as IEEE 754 says: Dr.Jit's fast-math shortcuts are off inside.
 
     With them `inf * 0` is 0 and GPUs approximate division, which a tracer that promises digits cannot have.
+    Subnormal numbers are the exception: they are zero in all threads, where they are in Dr.Jit's.
     """
-    with dr.scoped_set_flag(dr.JitFlag.FastMath, False):
+    with dr.scoped_set_flag(dr.JitFlag.FastMath, False), flushed_subnormals():
         yield
 
 

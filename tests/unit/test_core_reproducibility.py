@@ -37,6 +37,27 @@ def test_thread_count_changes_no_byte() -> None:
     assert same_bytes(picture(table, threads=1), picture(table, threads=2))
 
 
+def test_numbers_near_zero_are_the_same_in_all_threads() -> None:
+    """Highlights that fade below the smallest normal number: Dr.Jit's own threads flush such numbers to zero,
+    and so does the calling one, which has all the work with one thread and for a single pixel."""
+    scene = tracer.load("optics_mirror")
+
+    def layers(threads: int, crop: tuple[int, int, int, int] | None = None) -> dict[str, Any]:
+        return tracer.render(scene, aovs="all", resolution=(96, 72), threads=threads, crop=crop).aovs
+
+    shared = layers(2)
+    dim = shared["specular"][..., 0]
+    assert dim[dim > 0].min() >= np.finfo(np.float32).smallest_normal
+    row, column = map(int, np.argwhere(dim == dim[dim > 0].min())[0])
+    one, three, pixel = layers(1), layers(3), layers(2, (column, row, column + 1, row + 1))
+    for name, layer in shared.items():
+        assert layer.tobytes() == one[name].tobytes() == three[name].tobytes(), name
+        assert layer[row, column].tobytes() == pixel[name].tobytes(), name
+    assert (np.float32(1e-30) * np.full(4, 1e-9, np.float32)).all(), (
+        "the calling thread has its own ways again"
+    )
+
+
 @pytest.mark.parametrize("crop", [(0, 0, 9, 7), (13, 5, 32, 24)])
 def test_crop_changes_no_byte(crop: tuple[int, int, int, int]) -> None:
     table = worlds.FEATURES["disk jitter"]()
