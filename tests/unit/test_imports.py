@@ -22,6 +22,7 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"device_scene"}),
     frozenset({"whitted"}),
     frozenset({"render", "queries"}),
+    frozenset({"viewer"}),
     frozenset({"cli"}),
 )
 """Rooms of `tracer` from the ground up; a room reaches its own layer and lower ones, also through helpers."""

@@ -20,6 +20,7 @@ from tracer.cli.render import render
 from tracer.cli.scenes import scenes
 from tracer.cli.turntable import turntable
 from tracer.cli.validate import validate
+from tracer.cli.view import view
 from tracer.version import __version__
 
 
@@ -46,7 +47,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (render, turntable, classic, scenes, info, compare, validate, bench, export, doctor):
+for _command in (render, turntable, view, classic, scenes, info, compare, validate, bench, export, doctor):
     cli.add_command(_command)
 
 

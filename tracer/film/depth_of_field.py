@@ -28,6 +28,10 @@ LARGE_WINDOW = 4096
 
 LARGEST_REACH = 1 << 20
 
+SEARCHED = (1 << 24, 1 << 30)
+"""Pixels among which the similar ones are searched, the real ones or more: each of the two is a kernel of its
+own, and not every number of pixels that are not blank."""
+
 PIXELS_PER_LAUNCH = 1 << 18
 """Few enough for an answer to Ctrl-C."""
 
@@ -122,7 +126,9 @@ def depth_of_field(
         row = lane // double.opaque_id(width)
         column = lane - row * double.opaque_id(width) + double.opaque_id(x0)
         mixed = _filter(double, first, column, row + double.opaque_id(y0 + top), settings, canvas)
-        result[top : top + lines] = mixed.numpy().T.reshape(lines, width, 3)
+        dr.eval(mixed)
+        channels = [channel.numpy() for channel in mixed]  # together they would cost a kernel for each size
+        result[top : top + lines] = np.stack(channels, axis=-1).reshape(lines, width, 3)
     return result
 
 
@@ -213,13 +219,14 @@ def _similar(backend: Backend, first: _FirstPass, eye: Any, depth_range: Any) ->
     count."""
     assert first.by_distance is not None
     distances = first.by_distance[0]
-    count = dr.width(distances)
+    end_of_search = next(size for size in SEARCHED if size >= dr.width(distances))
+    count = backend.opaque_id(dr.width(distances))
 
     def difference(place: Any) -> Any:
         return dr.gather(backend.Float, distances, place, place < count) - eye
 
-    begin = dr.binary_search(0, count, lambda i: (i < count) & (difference(i) <= -depth_range))
-    end = dr.binary_search(0, count, lambda i: (i < count) & (difference(i) < depth_range))
+    begin = dr.binary_search(0, end_of_search, lambda i: (i < count) & (difference(i) <= -depth_range))
+    end = dr.binary_search(0, end_of_search, lambda i: (i < count) & (difference(i) < depth_range))
     return backend.UInt32(begin), backend.UInt32(end) - backend.UInt32(begin)
 
 

@@ -1,0 +1,135 @@
+"""What the panel offers of a scene: one control for each number that may be changed while it renders.
+
+A control is named by the path of its value, as for `--set`. All that the page may change of a scene, beside
+the camera and the choices, is what is listed here; ranges are kept on this side too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tracer.messages import dotted
+from tracer.scene import Scene
+from tracer.scene_warnings import finite_extents
+
+Path = tuple[str | int, ...]
+
+SHARES = ("reflection", "refraction", "absorption")
+"""k_r, k_t and k_a of a material: their sum is 1, whichever one is moved."""
+
+_AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Control:
+    """A slider: the value at `path` from `low` to `high`, `logarithmic` or not, under a heading."""
+
+    path: Path
+    group: str
+    heading: str
+    label: str
+    low: float
+    high: float
+    logarithmic: bool = False
+
+    @property
+    def name(self) -> str:
+        """The path as text, by which the page names the control."""
+        return dotted(self.path)
+
+    def clipped(self, value: float) -> float:
+        """The value within the range."""
+        return min(max(value, self.low), self.high)
+
+    def described(self) -> dict[str, Any]:
+        """What the page must know."""
+        return {
+            "name": self.name,
+            "group": self.group,
+            "heading": self.heading,
+            "label": self.label,
+            "low": self.low,
+            "high": self.high,
+            "logarithmic": self.logarithmic,
+        }
+
+
+def controls_of(scene: Scene) -> list[Control]:
+    """The controls of a scene, in the order of the panel; ranges reach beyond the values that it has."""
+    return [*_scene(), *_focus(scene), *_lights(scene), *_materials(scene), *_textures(scene)]
+
+
+def _scene() -> Iterator[Control]:
+    yield Control(("ambient",), "Scene", "", "ambient a", 0.0, 1.0)
+    yield Control(("cutoff",), "Scene", "", "cut-off", 0.01, 1.0, logarithmic=True)
+
+
+def _focus(scene: Scene) -> Iterator[Control]:
+    settings = scene.camera.depth_of_field
+    if settings is not None:
+        usual = abs(settings.focus)
+        yield Control(
+            ("camera", "depth_of_field", "focus"),
+            "Scene",
+            "",
+            "focus",
+            usual / 8,
+            usual * 8,
+            logarithmic=True,
+        )
+
+
+def _lights(scene: Scene) -> Iterator[Control]:
+    largest = max((light.weight for light in scene.lights), default=0.0) or 1.0
+    center, reach = _surroundings(scene)
+    for number, light in enumerate(scene.lights):
+        heading = light.name or f"light {number}"
+        place = "position" if light.kind == "point" else "center"
+        least = 0.0 if len(scene.lights) > 1 else largest / 100  # not all weights may be 0
+        yield Control(("lights", number, "weight"), "Lights", heading, "weight", least, 2 * largest)
+        for axis, value in enumerate(getattr(light, place)):
+            low, high = min(center[axis] - reach, value), max(center[axis] + reach, value)
+            path = ("lights", number, place, axis)
+            yield Control(path, "Lights", heading, f"{place} {_AXES[axis]}", low, high)
+
+
+def _materials(scene: Scene) -> Iterator[Control]:
+    for name, material in scene.materials.items():
+        path = ("materials", name)
+        for key, label in zip(SHARES, ("reflection k_r", "refraction k_t", "absorption k_a"), strict=True):
+            yield Control((*path, key), "Materials", name, label, 0.0, 1.0)
+        yield Control((*path, "ior"), "Materials", name, "ior", 0.5, max(3.0, material.ior))
+        yield Control((*path, "diffuse"), "Materials", name, "diffuse m", 0.0, max(2.0, 2 * material.diffuse))
+        yield Control(
+            (*path, "specular"), "Materials", name, "specular h", 0.0, max(2.0, 2 * material.specular)
+        )
+        most = max(500.0, material.shininess)
+        yield Control((*path, "shininess"), "Materials", name, "shininess s", 1.0, most, logarithmic=True)
+
+
+def _textures(scene: Scene) -> Iterator[Control]:
+    for name, texture in scene.textures.items():
+        interval = getattr(texture, "interval", None)
+        if interval is not None:
+            path = ("textures", name, "interval")
+            yield Control(path, "Textures", name, "interval", interval / 8, interval * 8, logarithmic=True)
+
+
+def _surroundings(scene: Scene) -> tuple[list[float], float]:
+    """The middle of the spheres, meshes and lights, and how far from it a light may go along each axis."""
+    points = [points for points, _ in finite_extents(scene).values()]
+    points += [
+        np.array([getattr(light, "position", getattr(light, "center", None))]) for light in scene.lights
+    ]
+    if not points:
+        return [0.0, 0.0, 0.0], 1.0
+    everything = np.concatenate(points)
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    reach = float((high - low).max()) or 1.0
+    rounded = 10.0 ** math.floor(math.log10(reach)) / 2
+    return ((low + high) / 2).tolist(), math.ceil(reach / rounded) * rounded
