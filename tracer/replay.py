@@ -3,8 +3,10 @@
 Dr.Jit runs the Python code of a kernel anew for every launch, to find out which kernel it is. A `Program`
 does that once for each structure of its arguments; after that their arrays go straight to the kernels
 (`dr.freeze`). What is structure is decided here and not left to Dr.Jit: everything in the arguments that is
-no array, and the type and the length of every array. So a recording never meets lengths other than its own,
-which Dr.Jit would have to guess for what the kernels write.
+no array, the type and the length of every array, and which arrays are one and the same. So a recording never
+meets lengths other than its own, which Dr.Jit would have to guess for what the kernels write, and never two
+arrays in place of one: of arrays that are the same Dr.Jit remembers the first place only, and would read from
+there in every replay (`dr.freeze` of `f([a, b, a])`, replayed with `[a, b, b]`, sees a third `a`).
 """
 
 from __future__ import annotations
@@ -50,7 +52,7 @@ class Program:
             result = _Performance(self._function, structure)(arrays)
         else:
             with self._lock:
-                result = self._recording((dr.thread_count(), structure))(arrays)
+                result = self._recording((dr.thread_count(), structure, _first_places(arrays)))(arrays)
         dr.eval(result)
         return result
 
@@ -62,7 +64,8 @@ class Program:
     def _recording(self, key: Structure) -> Callable[[list[Any]], dict[str, Any]]:
         found = self._recordings.get(key)
         if found is None:
-            found = self._recordings[key] = _recorded(_Performance(self._function, key[1]))
+            _, structure, _ = key
+            found = self._recordings[key] = _recorded(_Performance(self._function, structure))
             if len(self._recordings) > MOST_RECORDINGS:
                 self._recordings.popitem(last=False)
         self._recordings.move_to_end(key)
@@ -107,6 +110,12 @@ def _recorded(performance: _Performance) -> Callable[[list[Any]], dict[str, Any]
         raise failure
 
     return replayed
+
+
+def _first_places(arrays: list[Any]) -> tuple[int, ...]:
+    """For each array the place of the first one that is the same."""
+    places: dict[int, int] = {}
+    return tuple(places.setdefault(array.index, place) for place, array in enumerate(arrays))
 
 
 def _everything_is_symbolic() -> bool:

@@ -104,6 +104,16 @@ def test_a_name_and_the_threads_are_structure() -> None:
     assert counted.runs == 3
 
 
+def test_which_arrays_are_the_same_is_structure() -> None:
+    """Dr.Jit alone would read the third array where the first one is."""
+    backend = find_backend("llvm", "single")
+    one, two = backend.opaque(1.0), backend.opaque(2.0)
+    program = Program(lambda a, b, c: {"sum": a + 10 * b + 100 * c})
+    for _ in range(2):
+        for chosen, expected in ((one, 121), (two, 221)):
+            assert program(one, two, chosen)["sum"].numpy().tolist() == [expected]
+
+
 def test_forgotten_recordings_are_made_again() -> None:
     counted, given = Counted(), numbers([1, 2], [3], (4,))
     counted(given)
