@@ -131,10 +131,8 @@ def _triangle_tables(
     rows[:, 12], rows[:, 13] = primitives >> 16, primitives & 0xFFFF
     edges = _longest_edges(corners)
     rows[:, 14] = edges[hierarchy.order]
-    middle = (hierarchy.lower[0].astype(np.float64) + hierarchy.upper[0]) / 2
-    tables = TriangleTables(
-        backend.table(rows), threaded(backend, hierarchy), middle, float(np.median(edges))
-    )
+    box = np.stack([hierarchy.lower[0], hierarchy.upper[0]]).astype(np.float64)
+    tables = TriangleTables(backend.table(rows), threaded(backend, hierarchy), box, float(np.median(edges)))
     slots = np.full(sum(len(mesh.corners) for mesh in meshes.values()), -1)
     slots[order] = np.arange(len(order))
     return tables, slots

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -32,6 +33,15 @@ from tracer.shapes.plane import PlaneSlot
 from tracer.suspects import find_suspects
 
 
+@dataclass
+class Shadows:
+    """What is known of triangles between lights of one sample and hits: mask `known` (n,) of those hits, and
+    for each such light whether one is `hidden` (n,)."""
+
+    known: Any
+    hidden: list[Any]
+
+
 def direct_light(
     scene: DeviceScene,
     ray: Ray,
@@ -41,11 +51,12 @@ def direct_light(
     sub_ray: Any,
     active: Any,
     watch: Watch = NOTHING_WATCHED,
+    shadows: Shadows | None = None,
 ) -> DirectLight:
-    """The light of all samples that arrives at hits."""
+    """The light of all samples that arrives at hits; `shadows`: what is known of them already."""
     if scene.lights.unrolled is None or scene.options.transparent_shadows:
         return _looped(scene, ray, surface, finish, pixel, sub_ray, active, watch)
-    return _unrolled(scene, ray, surface, finish, scene.lights.unrolled, active, watch)
+    return _unrolled(scene, ray, surface, finish, scene.lights.unrolled, active, watch, shadows)
 
 
 # ---- Few lights: all samples stand in the kernel -----------------------------------------------------------
@@ -59,11 +70,12 @@ def _unrolled(
     lights: list[UnrolledLight],
     active: Any,
     watch: Watch,
+    shadows: Shadows | None,
 ) -> DirectLight:
     backend = scene.backend
     width = dr.width(active)
-    facing = [active & _may_be_lit(backend, surface, light.ball) for light in lights]
-    dark = _dark_samples(scene, ray, surface, lights, facing)
+    facing = [active & may_be_lit(backend, surface, light.ball) for light in lights]
+    dark = _dark_samples(scene, ray, surface, lights, facing, shadows)
 
     def shade(
         received: DirectLight, seen: list[Any], light: UnrolledLight, faces: Any
@@ -98,14 +110,19 @@ def _unrolled(
     return received
 
 
-def _may_be_lit(backend: Backend, surface: Surface, ball: Ball) -> Any:
+def may_be_lit(backend: Backend, surface: Surface, ball: Ball) -> Any:
     """Mask: some point of the ball may lie on the lit side."""
     axis = ball.center - surface.p
     return dr.dot(surface.normal, axis) + ball.radius + 16 * backend.epsilon * max_abs(axis) > 0
 
 
 def _dark_samples(
-    scene: DeviceScene, ray: Ray, surface: Surface, lights: list[UnrolledLight], facing: list[Any]
+    scene: DeviceScene,
+    ray: Ray,
+    surface: Surface,
+    lights: list[UnrolledLight],
+    facing: list[Any],
+    shadows: Shadows | None,
 ) -> Any:
     """One bit a sample (n,): hidden by a mesh, or, for samples of an area light, by a sphere.
 
@@ -119,8 +136,12 @@ def _dark_samples(
     if not lights or not (crowded or any(areas)):
         return dark
     suspects, todo = [], dr.zeros(backend.UInt32, width)
+    known = iter([] if shadows is None else shadows.hidden)
     for light, faces, is_area in zip(lights, facing, areas, strict=True):
         who = find_suspects(scene, surface, light.ball, faces, spheres=is_area, beams=is_area)
+        if shadows is not None and not is_area:
+            who.meshes &= ~shadows.known
+            who.umbra |= shadows.known & next(known)
         bits = ((1 << len(light.samples)) - 1) << light.first
         todo |= dr.select(faces & who.doubtful, backend.UInt32(bits), 0)
         dark |= dr.select(who.umbra, backend.UInt32(bits), 0)

@@ -11,6 +11,7 @@ from tracer.aovs import compute_layers
 from tracer.backends import Backend
 from tracer.canvas import DeviceCanvas
 from tracer.device_scene import DeviceScene
+from tracer.first_hits import FirstHits
 from tracer.pixels import BandPlace, pixels_of
 from tracer.replay import Program
 from tracer.tiles import lane_count
@@ -25,12 +26,12 @@ def trace_band(
     canvas: DeviceCanvas,
     place: BandPlace,
     size: tuple[int, int],
-    first: Any,
+    first: FirstHits | None,
     layers: tuple[str, ...],
     shapes: int,
 ) -> dict[str, Any]:
     """The layers of a band of `size` columns and rows, pixels in the order of the picture, components last,
-    and the counters of `COUNTERS` (1,), each under its `count_of`. `first`: see `first_triangles`; `shapes`:
+    and the counters of `COUNTERS` (1,), each under its `count_of`. `first`: see `first_hits`; `shapes`:
     how many there are, if the rays that meet each are to be counted as `hits`, else 0."""
     backend = device.backend
     pixels = pixels_of(backend, place, size, dr.arange(backend.UInt32, lane_count(*size)))

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from tracer.errors import MachineError, UsageError
 from tracer.film.layout import COMPONENTS, VISIBILITY
+from tracer.light_tables import UNROLLED_LIGHTS
 from tracer.scene import Scene
 from tracer.settings import RAYS_PER_BAND
 from tracer.tiles import FEWEST_PIXELS
@@ -25,8 +26,8 @@ UNKNOWN_PROCESS = 320 << 20
 FILTER_BYTES = 100
 """A pixel, of the depth-of-field filter: colors and depths in double precision, pixels sorted by depth."""
 
-BUNDLE_BYTES = 12
-"""A primary ray, of the search for its first triangle."""
+FIRST_TRIANGLE = 12
+"""Bytes of a primary ray, of the search for its first triangle."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ def need_of(scene: Scene, layers: list[str], pixels: int, real: int, triangles: 
     written = numbers * 4 + 12
     filtered = FILTER_BYTES if scene.camera.depth_of_field is not None else 0
     fixed = _process() + KERNELS + pixels * (film + max(written, filtered))
-    return Need(fixed, pixel=2 * film + 32, ray=BUNDLE_BYTES if triangles else 0)
+    return Need(fixed, pixel=2 * film + 32, ray=_bundle_bytes(real) if triangles else 0)
 
 
 def rays_that_fit(need: Need, sub_rays: int, limit: int | None, most: int = RAYS_PER_BAND) -> int:
@@ -83,6 +84,11 @@ def in_words(size: int) -> str:
 
 def _components(scene: Scene, name: str) -> int:
     return len(scene.lights) if name == VISIBILITY else len(COMPONENTS.get(name, ("",)))
+
+
+def _bundle_bytes(real: int) -> int:
+    """The same, with the point there and what hides lights from it."""
+    return FIRST_TRIANGLE + 4 + 3 * real + UNROLLED_LIGHTS * (real + 4)
 
 
 def _process() -> int:

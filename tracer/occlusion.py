@@ -58,19 +58,27 @@ def hidden_by_many(
     if scene.sphere_table is not None:
         blocked = scene.sphere_table.blocks(segment, active & suspects.many)
     if scene.triangles is not None:
-        blocked = visit_triangles(
-            scene.backend,
-            scene.triangles,
-            segment.ray,
-            lambda: departure_to_light(scene, segment.ray, surface),
-            state=blocked,
-            limit=lambda blocked: segment.length,
-            visit=lambda blocked, _t, _primitive, _test, valid: blocked | valid,
-            active=active & suspects.meshes & ~blocked,
-            light=segment.length,
-            done=lambda blocked: blocked,
-        )
+        blocked = hidden_by_triangle(scene, segment, surface, blocked, active & suspects.meshes & ~blocked)
     return blocked & active
+
+
+def hidden_by_triangle(
+    scene: DeviceScene, segment: Segment, surface: Surface, blocked: Any, active: Any
+) -> Any:
+    """Mask: `blocked` already, or a triangle lies strictly between the two ends."""
+    assert scene.triangles is not None
+    return visit_triangles(
+        scene.backend,
+        scene.triangles,
+        segment.ray,
+        lambda: departure_to_light(scene, segment.ray, surface),
+        state=blocked,
+        limit=lambda blocked: segment.length,
+        visit=lambda blocked, _t, _primitive, _test, valid: blocked | valid,
+        active=active,
+        light=segment.length,
+        done=lambda blocked: blocked,
+    )
 
 
 def transmittance(

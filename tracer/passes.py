@@ -15,7 +15,7 @@ from tracer.film.counts import number_of_rays, together
 from tracer.film.film import Film
 from tracer.film.layout import VISIBILITY
 from tracer.film.work_file import WorkFile
-from tracer.first_hits import first_triangles
+from tracer.first_hits import first_hits
 from tracer.kept_bands import KeptBands, identity_of
 from tracer.launch import COUNTERS, counts_of, trace_band
 from tracer.memory import need_of, rays_that_fit
@@ -116,7 +116,7 @@ class Passes:
             n=backend.opaque_id(self.n),
         )
         size = (band.width, band.height)
-        first = first_triangles(self._device, self.canvas, self._device_canvas, place, size, self.n)
+        first = first_hits(self._device, self.canvas, self._device_canvas, place, size, self.n)
         layers, shapes = tuple(self.layers), self._counted_shapes
         found = trace_band(self._device, self._device_canvas, place, size, first, layers, shapes)
         counts = counts_of(found) | {"primary": band.width * band.height * self.n**2}

@@ -55,3 +55,14 @@ def primary_ray(backend: Backend, canvas: DeviceCanvas, pixels: PixelGrid, sub_r
     column = backend.Float(pixels.column) + (a + canvas.offset) / n
     row = backend.Float(pixels.row) + (b + canvas.offset) / n
     return canvas.ray(column, row)
+
+
+def numbered_rays(
+    backend: Backend, canvas: DeviceCanvas, place: BandPlace, size: tuple[int, int], number: Any
+) -> tuple[PixelGrid, Any, Any]:
+    """Pixels, origins and directions (3, n) of the rays of a band by number: sub-ray times lanes plus
+    lane."""
+    launch = backend.opaque_id(lane_count(*size))
+    sub_ray = number // launch
+    pixels = pixels_of(backend, place, size, number - sub_ray * launch)
+    return pixels, *primary_ray(backend, canvas, pixels, sub_ray)

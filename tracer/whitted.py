@@ -14,11 +14,13 @@ from typing import Any
 import drjit as dr
 
 from tracer.acceleration.bundles import DOUBTFUL
+from tracer.acceleration.shadows_of_bundles import HIDDEN
 from tracer.arrival import DirectLight
 from tracer.backends import INVALID, Backend
 from tracer.canvas import DeviceCanvas
 from tracer.device_scene import DeviceScene
-from tracer.direct_light import direct_light
+from tracer.direct_light import Shadows, direct_light
+from tracer.first_hits import FirstHits
 from tracer.intersection import Known, Surface, closest_hit, free_ray, surface_at
 from tracer.path import make_path, path_type
 from tracer.pixels import PixelGrid, primary_ray
@@ -68,12 +70,12 @@ def trace_pixels(
     scene: DeviceScene,
     canvas: DeviceCanvas,
     pixels: PixelGrid,
-    first: Any,
+    first: FirstHits | None,
     layers: tuple[str, ...] = (),
     met: Any = None,
 ) -> PixelColumns:
-    """The colors, depths and ray counts of pixels, and layers that are sums. `first`: see
-    `first_triangles`. `met` (shapes,): where rays count themselves by the shape that they meet; None where
+    """The colors, depths and ray counts of pixels, and layers that are sums. `first`: what is known
+    of primary rays. `met` (shapes,): where rays count themselves by the shape that they meet; None where
     nobody asks."""
     # ---- Loop state, all of it in full width ----
     backend = scene.backend
@@ -101,7 +103,8 @@ def trace_pixels(
 
         # ---- The nearest surface ----
         is_primary = path.level == 0
-        known = _known(backend, first, sub_ray * pixels.lanes + pixels.lane, active & is_primary)
+        number = sub_ray * pixels.lanes + pixels.lane
+        known = _known_triangle(backend, first, number, active & is_primary)
         hit = closest_hit(scene, path.ray, active, known=known)
         surface = surface_at(scene, path.ray, hit, active)
         found = active & hit.valid
@@ -120,7 +123,10 @@ def trace_pixels(
         point = texture_point(scene, surface, found)
         own = texture_color(backend, scene.textures, material.texture, point, found)
         watch = sums.watch(is_primary)
-        light = direct_light(scene, path.ray, surface, material.finish, pixels.number, sub_ray, found, watch)
+        shadows = _known_shadows(backend, first, number, active & is_primary)
+        light = direct_light(
+            scene, path.ray, surface, material.finish, pixels.number, sub_ray, found, watch, shadows
+        )
         counts.shadow += light.shadow_rays
         base = path.throughput * own
         local = base * dr.fma(scene.not_ambient * material.absorption, light.total, scene.ambient)
@@ -188,12 +194,20 @@ def _own_parts(
     return parts
 
 
-def _known(backend: Backend, first: Any, number: Any, is_primary: Any) -> Known | None:
-    """What is known of primary rays; `number`: that of a ray among all of its launch."""
+def _known_triangle(backend: Backend, first: FirstHits | None, number: Any, is_primary: Any) -> Known | None:
+    """What is known of the hits of primary rays; `number`: that of a ray among all of its launch."""
     if first is None:
         return None
-    primitive = dr.gather(backend.UInt32, first, number, is_primary)
+    primitive = dr.gather(backend.UInt32, first.primitive, number, is_primary)
     return Known(is_primary & (primitive != DOUBTFUL), primitive)
+
+
+def _known_shadows(backend: Backend, first: FirstHits | None, number: Any, is_primary: Any) -> Shadows | None:
+    """What is known of the lights of primary hits."""
+    if first is None or not first.hidden:
+        return None
+    hidden = [dr.gather(backend.UInt32, found, number, is_primary) == HIDDEN for found in first.hidden]
+    return Shadows(is_primary, hidden)
 
 
 def primary_path(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, sub_ray: Any) -> Any:

@@ -15,9 +15,9 @@ import numpy as np
 
 import tracer
 from reference.bench.frames import Check
-from reference.bench.rays import EYE, KINDS, Rays, primary, secondary
+from reference.bench.rays import EYE, KINDS, LIGHT, Rays, primary, secondary
 from reference.bench.records import Rate, Series
-from tracer.backends import Backend, exact_arithmetic, find_backend
+from tracer.backends import INVALID, Backend, exact_arithmetic, find_backend
 from tracer.device_scene import compile_scene
 from tracer.intersection import closest_hit, free_ray
 from tracer.queries import intersect
@@ -83,10 +83,9 @@ class Ours:
         """Closest hits, or any hit for shadow rays."""
         backend = self._backend
         o, d = (backend.Vector3(*map(backend.table, a.T)) for a in (rays.o, rays.d))
-        limit = None if rays.length is None else backend.Float(rays.length)
         active = dr.full(backend.Bool, True, rays.count)
-        eye = backend.opaque_vector(EYE)
-        dr.eval(o, d, limit, active)
+        eye, light = backend.opaque_vector(EYE), backend.opaque_vector(LIGHT)
+        dr.eval(o, d, active)
 
         def closest() -> Any:
             with exact_arithmetic():
@@ -100,34 +99,28 @@ class Ours:
                 dr.eval(hit)
             return hit.valid
 
-        def anything() -> Any:
+        def shadow() -> Any:
             with exact_arithmetic():
-                blocked = any_triangle(self._device, free_ray(self._device, o, d), limit, active)
+                blocked = hidden_neighbors(self._device, o, light)
                 dr.eval(blocked)
             return blocked
 
-        if limit is not None:
-            return anything
+        if rays.length is not None:
+            return shadow
         return coherent if kind.startswith("primary") else closest
 
 
 def closest_of_neighbors(device: Any, o: Any, d: Any, eye: Any, active: Any) -> Any:
     """Closest hits of rays that start in one eye, as the renderer finds those of its primary rays: in
     bundles."""
-    from tracer.acceleration.bundles import RAYS, Bundles, nearest_of_neighbors, settle_doubtful
+    from tracer.acceleration.bundles import RAYS, settle_doubtful
+    from tracer.acceleration.first_of_bundles import Bundles, nearest_of_neighbors
     from tracer.intersection import closest_triangle, known_triangle
 
     backend = device.backend
 
     def bundles_of(bundle: Any) -> Bundles:
-        packets = [
-            [
-                dr.gather(backend.FloatN, c, bundle * (RAYS // 8) + half, shape=(8, dr.width(bundle)))
-                for c in d
-            ]
-            for half in range(RAYS // 8)
-        ]
-        directions = [backend.Vector3(*(part[k] for part in packet)) for packet in packets for k in range(8)]
+        directions = _neighbors(backend, d, bundle)
         return Bundles(eye, directions, [dr.zeros(backend.Float, dr.width(bundle))] * RAYS)
 
     def singly(numbers: Any) -> Any:
@@ -138,6 +131,47 @@ def closest_of_neighbors(device: Any, o: Any, d: Any, eye: Any, active: Any) -> 
     settle_doubtful(first, singly)
     nothing = no_hit(backend, dr.width(d))
     return known_triangle(device, free_ray(device, o, d), nothing, active, first)
+
+
+def hidden_neighbors(device: Any, o: Any, light: Any) -> Any:
+    """Mask: some triangle lies between points and a light, as the renderer finds it where primary rays hit:
+    in bundles from the light."""
+    from tracer.acceleration.bundles import RAYS, in_order, settle_doubtful
+    from tracer.acceleration.shadows_of_bundles import HIDDEN, LIT, LitPoints, hidden_points
+
+    backend = device.backend
+    bundle = dr.arange(backend.UInt32, dr.width(o) // RAYS)
+
+    def reach(p: Any) -> Any:
+        return dr.norm(light - p)
+
+    def singly(numbers: Any) -> Any:
+        p = dr.gather(type(o), o, numbers)
+        length = reach(p)
+        ray = free_ray(device, p, (light - p) / length)
+        everything = dr.full(backend.Bool, True, dr.width(numbers))
+        return dr.select(any_triangle(device, ray, length, everything), backend.UInt32(HIDDEN), LIT)
+
+    points = _neighbors(backend, o, bundle)
+    nothing_left = [backend.UInt32(INVALID)] * RAYS
+    bundles = LitPoints([reach(p) for p in points], lambda: points, lambda: nothing_left)
+    hidden = in_order(backend, hidden_points(backend, device.triangles, light, bundles), bundle)
+    settle_doubtful(hidden, singly)
+    return hidden == HIDDEN
+
+
+def _neighbors(backend: Backend, vectors: Any, bundle: Any) -> list[Any]:
+    """The vectors (3, n) of the RAYS rays of bundles, read in packets."""
+    from tracer.acceleration.bundles import RAYS
+
+    parts = [
+        [
+            dr.gather(backend.FloatN, c, bundle * (RAYS // 8) + half, shape=(8, dr.width(bundle)))
+            for c in vectors
+        ]
+        for half in range(RAYS // 8)
+    ]
+    return [backend.Vector3(*(c[k] for c in part)) for part in parts for k in range(8)]
 
 
 def any_triangle(device: Any, ray: Ray, length: Any, active: Any) -> Any:

@@ -15,6 +15,8 @@ NUDGE = 1e-4
 
 KINDS = ("primary, scan order", "primary, tile order", "shadow", "mirror", "diffuse")
 TILE = 8
+BUNDLE = 16
+"""Shadow rays come in whole bundles."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,8 @@ def secondary(first: Rays, t: np.ndarray, normal: np.ndarray) -> dict[str, Rays]
     p = first.o[hit] + t[hit, None] * d + NUDGE * n
     to_light = LIGHT - p
     length = np.linalg.norm(to_light, axis=1)
-    lit = (to_light * n).sum(axis=1) > 0
+    lit = np.flatnonzero((to_light * n).sum(axis=1) > 0)
+    lit = lit[: len(lit) // BUNDLE * BUNDLE]
     rng = np.random.default_rng(7)
     around = rng.normal(size=p.shape)
     around /= np.linalg.norm(around, axis=1, keepdims=True)

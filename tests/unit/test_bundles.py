@@ -15,8 +15,9 @@ from tests.accuracy import worlds
 from tests.accuracy.worlds import icosphere
 from tests.unit.test_hierarchy import pile, scene_of, single, slivers, soup
 from tracer import first_hits
-from tracer.acceleration import bundles
-from tracer.acceleration.bundles import DOUBTFUL, RAYS, Bundles, nearest_of_bundles
+from tracer.acceleration import first_of_bundles
+from tracer.acceleration.bundles import DOUBTFUL, RAYS
+from tracer.acceleration.first_of_bundles import Bundles, nearest_of_bundles
 from tracer.backends import Backend, exact_arithmetic, find_backend
 from tracer.camera import Camera
 from tracer.canvas import Canvas, DeviceCanvas
@@ -124,7 +125,7 @@ def test_what_bundles_call_certain_is_what_single_rays_find(name: str, precision
 
 
 def test_too_little_doubt_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bundles, "ROUNDING", 0.0)
+    monkeypatch.setattr(first_of_bundles, "ROUNDING", 0.0)
     with pytest.raises(AssertionError):
         for name in SOUPS:
             compare(name, "single")
@@ -147,7 +148,7 @@ def test_few_rays_are_doubtful(precision: str, most: float) -> None:
 
 
 def test_bundles_that_meet_too_many_triangles_are_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bundles, "MOST_TRIANGLES", 2)
+    monkeypatch.setattr(first_of_bundles, "MOST_TRIANGLES", 2)
     corners = SOUPS["fine soup"]()
     device = compile_scene(scene_of(corners), find_backend("llvm"))
     found, singly = both_ways(device, cameras(corners)[0])
@@ -160,7 +161,8 @@ def test_bundles_that_meet_too_many_triangles_are_given_up(monkeypatch: pytest.M
 
 def picture(scene: tracer.Scene, patch: pytest.MonkeyPatch, bundled: bool, **settings: Any) -> Any:
     patch.setattr(first_hits, "FEWEST_RAYS", 0 if bundled else 1 << 40)
-    patch.setattr(first_hits, "SMALLEST_EDGE", 0.0)
+    for threshold in ("SMALLEST_EDGE", "SMALLEST_SHADOW_EDGE", "SMALLEST_SHARE"):
+        patch.setattr(first_hits, threshold, 0.0)
     return tracer.render(scene, **settings)
 
 

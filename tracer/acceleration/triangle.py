@@ -34,12 +34,12 @@ decided by geometry."""
 @dataclass
 class TriangleTables:
     """All triangles of a scene in Dr.Jit memory: `rows` of `TRIANGLE_WORDS` words each, in the order of the
-    leaves, and the hierarchy over them. On the host: the `middle` (3,) of all, and the median length of their
-    longest edges, `typical_edge`."""
+    leaves, and the hierarchy over them. On the host: the `box` (2, 3) around all, and the median length of
+    their longest edges, `typical_edge`."""
 
     rows: Any
     lists: NodeLists
-    middle: np.ndarray = field(metadata=NOT_IN_KERNELS)
+    box: np.ndarray = field(metadata=NOT_IN_KERNELS)
     typical_edge: float = field(metadata=NOT_IN_KERNELS)
 
 

@@ -1,0 +1,144 @@
+"""Which lights triangles hide from the points that primary rays meet first, found before the loop in bundles.
+
+For lights of one sample that stand in the kernel one by one; the loop asks about all others, about what other
+shapes hide, and about points that other rays meet.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import drjit as dr
+
+from tracer.acceleration.bundles import RAYS, in_order, settle_doubtful
+from tracer.acceleration.shadows_of_bundles import HIDDEN, LIT, LitPoints, certain_reach, hidden_points
+from tracer.arrival import segment_to
+from tracer.backends import Backend
+from tracer.canvas import DeviceCanvas
+from tracer.device_scene import DeviceScene
+from tracer.direct_light import may_be_lit
+from tracer.intersection import Known, Surface, closest_hit, free_ray, surface_at
+from tracer.light_tables import LightSample, UnrolledLight
+from tracer.occlusion import hidden_by_plane, hidden_by_triangle
+from tracer.pixels import BandPlace, numbered_rays
+from tracer.ray import Ray
+from tracer.replay import Program
+from tracer.suspects import find_suspects
+
+
+def lights_asked(scene: DeviceScene) -> list[UnrolledLight]:
+    """The lights whose shadows are found in bundles."""
+    if scene.triangles is None or scene.lights.unrolled is None or scene.options.transparent_shadows:
+        return []
+    return [light for light in scene.lights.unrolled if len(light.samples) == 1]
+
+
+def first_shadows(
+    scene: DeviceScene, canvas: DeviceCanvas, place: BandPlace, size: tuple[int, int], primitives: Any
+) -> list[Any]:
+    """For each of `lights_asked` and every primary ray of a band (lanes n n,), `HIDDEN` where triangles hide
+    the light from the point that it meets first. `primitives`: the triangles that they meet."""
+    lights = lights_asked(scene)
+    if not lights:
+        return []
+    points = lit_points(scene, canvas, place, size, primitives)
+
+    def single(numbers: Any, sample: LightSample) -> Any:
+        return singly(scene, canvas, place, size, primitives, sample, numbers)["hidden"]
+
+    hidden = []
+    for number, light in enumerate(lights):
+        where = [points[name] for name in ("x", "y", "z", "primitive", _reach_of(number))]
+        found = bundled(scene, light.samples[0].position, where)["hidden"]
+        settle_doubtful(found, partial(single, sample=light.samples[0]))
+        hidden.append(found)
+    return hidden
+
+
+@Program
+def lit_points(
+    scene: DeviceScene, canvas: DeviceCanvas, place: BandPlace, size: tuple[int, int], primitives: Any
+) -> dict[str, Any]:
+    """What all rays of a band meet: the point `x`, `y`, `z` and its `primitive`, and for each light how far
+    it reaches (see `LitPoints`)."""
+    assert scene.triangles is not None
+    backend = scene.backend
+    number = dr.arange(backend.UInt32, len(primitives))
+    ray, surface, found = _first_surface(scene, canvas, place, size, number, primitives)
+    values = {"x": surface.p.x, "y": surface.p.y, "z": surface.p.z, "primitive": surface.primitive}
+    for k, light in enumerate(lights_asked(scene)):
+        faces = found & may_be_lit(backend, surface, light.ball)
+        suspects = find_suspects(scene, surface, light.ball, faces, spheres=False, beams=False)
+        segment = segment_to(ray, surface, light.samples[0])
+        asks = suspects.meshes & ~hidden_by_plane(scene, segment, faces) & (segment.length > 0)
+        reach = certain_reach(backend, scene.triangles, surface.p, surface.lit_side, segment.light)
+        values[_reach_of(k)] = dr.select(asks, reach, 0)
+    return values
+
+
+@Program
+def bundled(scene: DeviceScene, light: Any, where: list[Any]) -> dict[str, Any]:
+    """Whether triangles hide a light (3, 1) from points, in bundles of neighbors; see `hidden_points`."""
+    assert scene.triangles is not None
+    backend = scene.backend
+    bundle = dr.arange(backend.UInt32, len(where[0]) // RAYS)
+    *place, primitives, reach = where
+
+    def points() -> list[Any]:
+        x, y, z = (_neighbors(backend, values, bundle) for values in place)
+        return [backend.Vector3(*p) for p in zip(x, y, z, strict=True)]
+
+    bundles = LitPoints(
+        _neighbors(backend, reach, bundle), points, lambda: _neighbors(backend, primitives, bundle)
+    )
+    answers = hidden_points(backend, scene.triangles, light, bundles)
+    return {"hidden": in_order(backend, answers, bundle)}
+
+
+@Program
+def singly(
+    scene: DeviceScene,
+    canvas: DeviceCanvas,
+    place: BandPlace,
+    size: tuple[int, int],
+    primitives: Any,
+    sample: LightSample,
+    numbers: Any,
+) -> dict[str, Any]:
+    """The same for the rays with these numbers, each by itself."""
+    backend = scene.backend
+    known = dr.gather(backend.UInt32, primitives, numbers)
+    ray, surface, found = _first_surface(scene, canvas, place, size, numbers, known)
+    blocked = dr.full(backend.Bool, False, len(numbers))
+    blocked = hidden_by_triangle(scene, segment_to(ray, surface, sample), surface, blocked, found)
+    return {"hidden": dr.select(blocked, backend.UInt32(HIDDEN), LIT)}
+
+
+def _first_surface(
+    scene: DeviceScene,
+    canvas: DeviceCanvas,
+    place: BandPlace,
+    size: tuple[int, int],
+    number: Any,
+    primitive: Any,
+) -> tuple[Ray, Surface, Any]:
+    """Rays by number, what they meet first, and mask: they meet something."""
+    pixels, o, d = numbered_rays(scene.backend, canvas, place, size, number)
+    ray = free_ray(scene, o, d)
+    everything = dr.full(scene.backend.Bool, True, dr.width(number))
+    hit = closest_hit(scene, ray, pixels.active, known=Known(everything, primitive))
+    return ray, surface_at(scene, ray, hit, pixels.active), pixels.active & hit.valid
+
+
+def _neighbors(backend: Backend, values: Any, bundle: Any) -> list[Any]:
+    """The values (RAYS n,) of the RAYS rays of bundles, (n,) each."""
+    # Packets have 8 words at most.
+    packet = backend.IdN if type(values) is backend.UInt32 else backend.FloatN
+    shape = (8, dr.width(bundle))
+    parts = [dr.gather(packet, values, bundle * (RAYS // 8) + half, shape=shape) for half in range(RAYS // 8)]
+    return [part[k] for part in parts for k in range(8)]
+
+
+def _reach_of(light: int) -> str:
+    return f"reach of light {light}"
