@@ -11,6 +11,7 @@ import json
 import os
 import platform
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -21,6 +22,9 @@ from tracer.llvm import VARIABLE, LlvmLibrary, find_llvm
 from tracer.llvm_search import install_hint
 
 DISTRIBUTION = "whitted-tracer"
+VIEWER_LIBRARIES = ("starlette", "uvicorn", "websockets")
+"""What the extra `viewer` installs."""
+
 _PACKAGES = ("drjit", "mitsuba", "numpy", "pydantic", "opencv-python-headless", "OpenEXR")
 _TRY_BACKENDS = """
 import json, sys
@@ -106,6 +110,10 @@ def _missing(report: dict[str, Any]) -> list[dict[str, Any]]:
         gaps.append(_gap("LLVM 17 or newer", "rendering on the processor", required, command))
     if report["povray"] is None:
         gaps.append(_gap("POV-Ray", "a comparison in `tracer bench`", False, "install the package povray"))
+    absent = [name for name in VIEWER_LIBRARIES if _version(name) is None]
+    if absent:
+        command = shlex.join([sys.executable, "-m", "pip", "install", *map(_requirement, absent)])
+        gaps.append(_gap(" and ".join(absent), "`tracer view`", False, command))
     return gaps
 
 

@@ -61,3 +61,17 @@ def test_the_command_for_mitsuba_carries_the_version(monkeypatch: pytest.MonkeyP
     gap = next(gap for gap in diagnose()["missing"] if gap["what"].startswith("mitsuba"))
     assert gap["command"].endswith("-m pip install mitsuba==3.9.1")
     assert not gap["required"]
+
+
+def test_what_the_viewer_lacks_is_optional(monkeypatch: pytest.MonkeyPatch) -> None:
+    version = importlib.metadata.version
+
+    def without_uvicorn(name: str) -> str:
+        if name == "uvicorn":
+            raise importlib.metadata.PackageNotFoundError(name)
+        return version(name)
+
+    monkeypatch.setattr(importlib.metadata, "version", without_uvicorn)
+    gap = next(gap for gap in diagnose()["missing"] if gap["what"] == "uvicorn")
+    assert gap["needed_for"] == "`tracer view`" and not gap["required"]
+    assert "-m pip install" in gap["command"] and "uvicorn" in gap["command"]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 from pathlib import Path
 
 import pytest
 
 import tracer
+from tracer.cli.app import run
 from tracer.errors import OutputError, UsageError
 from tracer.viewer.messages import LONGEST, Orbit, parse
 from tracer.viewer.safety import Guard, is_loopback
@@ -107,3 +109,18 @@ def test_saving_takes_a_free_name_in_the_folder_and_no_other(tmp_path: Path) -> 
 def test_a_folder_that_is_gone_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="cannot be written"):
         Folder(tmp_path / "gone", "scene").save_scene(tracer.load({}))
+
+
+def test_without_its_libraries_the_viewer_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    find = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name, *more: None if name == "uvicorn" else find(name, *more)
+    )
+    assert run(["view", "classic"]) == 3
+    said = capsys.readouterr().err
+    assert said == (
+        "tracer: error: the viewer needs uvicorn, not installed here; "
+        "`pip install whitted-tracer[viewer]` installs what it needs\n"
+    )

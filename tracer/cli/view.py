@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from tracer.viewer.state import Source
 
 USUAL_PORT = 8433
-LIBRARIES = ("starlette", "uvicorn", "websockets")
 
 
 @click.command(short_help="Look at a scene, turn it and edit it, live in the browser.")
@@ -85,11 +84,13 @@ def view(
       tracer view my.toml --resolution 640 480
       tracer view classic --host 0.0.0.0
     """
-    missing = [name for name in LIBRARIES if importlib.util.find_spec(name) is None]
+    from tracer.doctor import VIEWER_LIBRARIES
+
+    missing = [name for name in VIEWER_LIBRARIES if importlib.util.find_spec(name) is None]
     if missing:
         raise MachineError(
-            f"the viewer needs {' and '.join(missing)}, which is not installed; "
-            "`pip install whitted-tracer[viewer]` installs it"
+            f"the viewer needs {' and '.join(missing)}, not installed here; "
+            "`pip install whitted-tracer[viewer]` installs what it needs"
         )
     from tracer.backends import find_backend
     from tracer.viewer import server

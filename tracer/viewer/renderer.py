@@ -11,9 +11,8 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from tracer.backends import thread_count
@@ -25,10 +24,14 @@ from tracer.viewer.frames import DRAFT_QUALITY, STILL_QUALITY, Frame, compressed
 from tracer.viewer.layers import aovs_of, picture_of
 from tracer.viewer.pace import Pace
 from tracer.viewer.session import Session
+from tracer.viewer.stages import Stage, stages_of
 from tracer.viewer.state import View
 
 SETTLED = 0.25
 """Seconds without a change after which the picture is sharpened."""
+
+IDLE = 1.0
+"""Seconds after which a thread that waits looks around, without need."""
 
 RAYS_PER_BAND = 1 << 17
 """Primary rays of a launch while a picture is sharpened: soon given up when something moves."""
@@ -40,15 +43,6 @@ T = TypeVar("T")
 
 class _Dropped(Exception):
     """Nobody waits for this picture any more."""
-
-
-@dataclass(frozen=True)
-class _Stage:
-    """A picture of a view: its scale, and n for n x n rays a pixel; `is_draft`: made at once."""
-
-    scale: float
-    supersample: int
-    is_draft: bool
 
 
 class Renderer:
@@ -113,20 +107,20 @@ class Renderer:
     def _run(self) -> None:
         with thread_count(self._threads):
             compile_copies(self._backend)
-            stages: list[_Stage] = []
+            stages: list[Stage] = []
             revision = -1
             while not self._stopped:
                 self._do_tasks()
-                if not self._ready():
-                    self._wait(None)
-                    continue
                 view = self._session.view
+                if not self._ready():
+                    self._wait(view, IDLE, self._ready)
+                    continue
                 if view.revision != revision:
-                    revision, stages = view.revision, list(self._stages(view))
+                    revision, stages = view.revision, stages_of(view, self._pace.scale)
                 elif not self._settled(view):
                     continue
                 if not stages:
-                    self._wait(None)
+                    self._wait(view, IDLE)
                 elif self._show(view, stages[0]):
                     del stages[0]
 
@@ -142,36 +136,32 @@ class Renderer:
         """Whether the view has been at rest long enough; else waits until it has, or something happens."""
         remaining = view.changed + SETTLED - time.monotonic()
         if remaining > 0:
-            self._wait(remaining)
+            self._wait(view, remaining)
         return remaining <= 0
 
-    def _wait(self, seconds: float | None) -> None:
-        revision = self._session.view.revision
+    def _wait(self, view: View, seconds: float, until: Callable[[], bool] = lambda: False) -> None:
+        """Waits until another view is wanted, or a task is there, or that is true, or the time is up."""
         with self._changed:
-            if not (self._stopped or self._tasks or self._session.view.revision != revision):
-                self._changed.wait(1.0 if seconds is None else seconds)
+            if not (self._stopped or self._tasks or self._session.view is not view or until()):
+                self._changed.wait(seconds)
 
     # ---- Pictures ----
 
-    def _stages(self, view: View) -> Iterator[_Stage]:
-        """A draft as large as the pace allows, the full picture, and that with all sub-rays."""
-        scale, n = self._pace.scale, view.scene.camera.supersample
-        yield _Stage(scale, 1, True)
-        if scale < 1 and n > 1:
-            yield _Stage(1.0, 1, False)
-        yield _Stage(1.0, n, False)
-
-    def _show(self, view: View, stage: _Stage) -> bool:
+    def _show(self, view: View, stage: Stage) -> bool:
         """Renders a stage and publishes it; False where it was given up."""
-        self._prepare(view)
-        started = time.perf_counter()
         try:
+            self._prepare(view)
+            started = time.perf_counter()
             result = self._rendered(view, stage)
         except _Dropped:
             self.dropped += 1
             return False
         except TracerError as error:
             self._fail(str(error))
+            return True
+        except Exception as error:  # the thread must outlive it: the next view may do
+            logger.exception("a picture failed")
+            self._fail(f"unexpected {type(error).__name__}: {error}")
             return True
         rendered = time.perf_counter()
         image = picture_of(view.layer, result, legend=not stage.is_draft)
@@ -188,7 +178,7 @@ class Renderer:
                 height=height,
                 scale=stage.scale,
                 supersample=stage.supersample,
-                final=stage.supersample == view.scene.camera.supersample and not stage.is_draft,
+                final=stage.is_final,
                 depth=float(result.depth[height // 2, width // 2]),
                 seconds={"render": rendered - started, "compress": done - rendered},
                 jpeg=jpeg,
@@ -204,7 +194,7 @@ class Renderer:
             self._has_filters = True
             compile_filters(view.scene, self._backend)
 
-    def _rendered(self, view: View, stage: _Stage) -> Result:
+    def _rendered(self, view: View, stage: Stage) -> Result:
         def progress(*_: int) -> None:
             if not stage.is_draft and (self._stopped or self._tasks or self._session.view is not view):
                 raise _Dropped

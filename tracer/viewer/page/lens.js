@@ -39,7 +39,7 @@ export class Lens {
     if (!line) return null;
     const made = document.createElementNS(SVG, "line");
     const [[x1, y1], [x2, y2]] = line;
-    const numbers = { x1, y1, x2, y2, "stroke-width": 0.8 + 3 * weight, "stroke-opacity": 0.35 + 0.6 * weight };
+    const numbers = { x1, y1, x2, y2, "stroke-width": 1.2 + 3 * weight, "stroke-opacity": 0.55 + 0.45 * weight };
     for (const [name, value] of Object.entries(numbers)) made.setAttribute(name, value);
     made.classList.add(ray);
     return made;

@@ -11,14 +11,17 @@ const picture = new Picture(link);
 const panel = new Panel(link);
 const lens = new Lens(link);
 const notice = document.getElementById("notice");
+const compare = document.getElementById("compare");
 
 listen(picture, link);
 panel.onresolution = (width, height) => picture.shaped(width, height);
 link.on("closed", () => picture.forget());
-link.on("notice", ({ text }) => (notice.textContent = text));
+link.on("notice", ({ text }) => {
+  notice.textContent = text;
+  compare.disabled = false;
+});
 link.on("saved", ({ file }) => (notice.textContent = `saved ${file}`));
 
-const compare = document.getElementById("compare");
 compare.addEventListener("click", () => {
   compare.disabled = true;
   notice.textContent = "Mitsuba is rendering …";
