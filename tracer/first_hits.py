@@ -18,9 +18,8 @@ from tracer.canvas import Canvas, DeviceCanvas
 from tracer.device_scene import DeviceScene
 from tracer.first_shadows import first_shadows
 from tracer.intersection import closest_triangle, free_ray
-from tracer.pixels import BandPlace, numbered_rays
+from tracer.pixels import Lanes, numbered_rays
 from tracer.replay import Program
-from tracer.tiles import lane_count
 
 FEWEST_RAYS = 1 << 18
 """For fewer it takes longer to record the bundles than they save."""
@@ -45,40 +44,33 @@ class FirstHits:
 
 
 def first_hits(
-    scene: DeviceScene,
-    canvas: Canvas,
-    device_canvas: DeviceCanvas,
-    place: BandPlace,
-    size: tuple[int, int],
-    n: int,
+    scene: DeviceScene, canvas: Canvas, device_canvas: DeviceCanvas, lanes: Lanes, n: int
 ) -> FirstHits | None:
-    """What primary rays of a band meet first; None in a scene without triangles.
+    """What primary rays of a launch meet first; None in a scene without triangles.
 
     Whether bundles pay makes no difference to what is found.
     """
     if scene.triangles is None:
         return None
-    index, rays = scene.backend.UInt32, lane_count(*size) * n * n
+    index, rays = scene.backend.UInt32, lanes.count * n * n
     edge, share = _appearance(scene.triangles, canvas)
     if rays < FEWEST_RAYS or edge < SMALLEST_EDGE:
         return FirstHits(dr.opaque(index, DOUBTFUL, rays), [])
-    found = bundled(scene, device_canvas, place, size, rays)["primitive"]
-    settle_doubtful(found, lambda numbers: singly(scene, device_canvas, place, size, numbers)["primitive"])
+    found = bundled(scene, device_canvas, lanes, rays)["primitive"]
+    settle_doubtful(found, lambda numbers: singly(scene, device_canvas, lanes, numbers)["primitive"])
     if edge < SMALLEST_SHADOW_EDGE or share < SMALLEST_SHARE:
         return FirstHits(found, [])
-    return FirstHits(found, first_shadows(scene, device_canvas, place, size, found))
+    return FirstHits(found, first_shadows(scene, device_canvas, lanes, found))
 
 
 @Program
-def bundled(
-    scene: DeviceScene, canvas: DeviceCanvas, place: BandPlace, size: tuple[int, int], rays: int
-) -> dict[str, Any]:
+def bundled(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, rays: int) -> dict[str, Any]:
     """What so many rays meet, in bundles; see `nearest_of_neighbors`."""
     assert scene.triangles is not None
 
     def bundles_of(bundle: Any) -> Bundles:
         numbers = [bundle * RAYS + k for k in range(RAYS)]
-        rays = [numbered_rays(scene.backend, canvas, place, size, number)[1:] for number in numbers]
+        rays = [numbered_rays(scene.backend, canvas, lanes, number)[1:] for number in numbers]
         return Bundles.of(canvas.eye, rays)
 
     primitive = nearest_of_neighbors(scene.backend, scene.triangles, rays, bundles_of)
@@ -86,11 +78,9 @@ def bundled(
 
 
 @Program
-def singly(
-    scene: DeviceScene, canvas: DeviceCanvas, place: BandPlace, size: tuple[int, int], numbers: Any
-) -> dict[str, Any]:
+def singly(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, numbers: Any) -> dict[str, Any]:
     """What the rays with these numbers meet, each by itself."""
-    _, o, d = numbered_rays(scene.backend, canvas, place, size, numbers)
+    _, o, d = numbered_rays(scene.backend, canvas, lanes, numbers)
     everything = dr.full(scene.backend.Bool, True, len(numbers))
     return {"primitive": closest_triangle(scene, free_ray(scene, o, d), everything).primitive}
 

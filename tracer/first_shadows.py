@@ -21,7 +21,7 @@ from tracer.direct_light import may_be_lit
 from tracer.intersection import Known, Surface, closest_hit, free_ray, surface_at
 from tracer.light_tables import LightSample, UnrolledLight
 from tracer.occlusion import hidden_by_plane, hidden_by_triangle
-from tracer.pixels import BandPlace, numbered_rays
+from tracer.pixels import Lanes, numbered_rays
 from tracer.ray import Ray
 from tracer.replay import Program
 from tracer.suspects import find_suspects
@@ -34,18 +34,16 @@ def lights_asked(scene: DeviceScene) -> list[UnrolledLight]:
     return [light for light in scene.lights.unrolled if len(light.samples) == 1]
 
 
-def first_shadows(
-    scene: DeviceScene, canvas: DeviceCanvas, place: BandPlace, size: tuple[int, int], primitives: Any
-) -> list[Any]:
-    """For each of `lights_asked` and every primary ray of a band (lanes n n,), `HIDDEN` where triangles hide
+def first_shadows(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, primitives: Any) -> list[Any]:
+    """For each of `lights_asked` and every primary ray of a launch (lanes n n,), `HIDDEN` where triangles hide
     the light from the point that it meets first. `primitives`: the triangles that they meet."""
     lights = lights_asked(scene)
     if not lights:
         return []
-    points = lit_points(scene, canvas, place, size, primitives)
+    points = lit_points(scene, canvas, lanes, primitives)
 
     def single(numbers: Any, sample: LightSample) -> Any:
-        return singly(scene, canvas, place, size, primitives, sample, numbers)["hidden"]
+        return singly(scene, canvas, lanes, primitives, sample, numbers)["hidden"]
 
     hidden = []
     for number, light in enumerate(lights):
@@ -57,15 +55,13 @@ def first_shadows(
 
 
 @Program
-def lit_points(
-    scene: DeviceScene, canvas: DeviceCanvas, place: BandPlace, size: tuple[int, int], primitives: Any
-) -> dict[str, Any]:
-    """What all rays of a band meet: the point `x`, `y`, `z` and its `primitive`, and for each light how far
+def lit_points(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, primitives: Any) -> dict[str, Any]:
+    """What all rays of a launch meet: the point `x`, `y`, `z` and its `primitive`, and for each light how far
     it reaches (see `LitPoints`)."""
     assert scene.triangles is not None
     backend = scene.backend
     number = dr.arange(backend.UInt32, len(primitives))
-    ray, surface, found = _first_surface(scene, canvas, place, size, number, primitives)
+    ray, surface, found = _first_surface(scene, canvas, lanes, number, primitives)
     values = {"x": surface.p.x, "y": surface.p.y, "z": surface.p.z, "primitive": surface.primitive}
     for k, light in enumerate(lights_asked(scene)):
         faces = found & may_be_lit(backend, surface, light.ball)
@@ -100,8 +96,7 @@ def bundled(scene: DeviceScene, light: Any, where: list[Any]) -> dict[str, Any]:
 def singly(
     scene: DeviceScene,
     canvas: DeviceCanvas,
-    place: BandPlace,
-    size: tuple[int, int],
+    lanes: Lanes,
     primitives: Any,
     sample: LightSample,
     numbers: Any,
@@ -109,7 +104,7 @@ def singly(
     """The same for the rays with these numbers, each by itself."""
     backend = scene.backend
     known = dr.gather(backend.UInt32, primitives, numbers)
-    ray, surface, found = _first_surface(scene, canvas, place, size, numbers, known)
+    ray, surface, found = _first_surface(scene, canvas, lanes, numbers, known)
     blocked = dr.full(backend.Bool, False, len(numbers))
     blocked = hidden_by_triangle(scene, segment_to(ray, surface, sample), surface, blocked, found)
     return {"hidden": dr.select(blocked, backend.UInt32(HIDDEN), LIT)}
@@ -118,13 +113,12 @@ def singly(
 def _first_surface(
     scene: DeviceScene,
     canvas: DeviceCanvas,
-    place: BandPlace,
-    size: tuple[int, int],
+    lanes: Lanes,
     number: Any,
     primitive: Any,
 ) -> tuple[Ray, Surface, Any]:
     """Rays by number, what they meet first, and mask: they meet something."""
-    pixels, o, d = numbered_rays(scene.backend, canvas, place, size, number)
+    pixels, o, d = numbered_rays(scene.backend, canvas, lanes, number)
     ray = free_ray(scene, o, d)
     everything = dr.full(scene.backend.Bool, True, dr.width(number))
     hit = closest_hit(scene, ray, pixels.active, known=Known(everything, primitive))

@@ -17,6 +17,7 @@ from tracer.film.work_file import WorkFile
 from tracer.llvm import ensure_llvm
 from tracer.scene import Scene
 from tracer.scene.files import file_digests
+from tracer.settings import Settings
 from tracer.tiles import Band, Rectangle, after
 from tracer.version import __version__
 
@@ -33,8 +34,11 @@ class KeptBands:
     traced.
     """
 
-    def __init__(self, work: WorkFile | None, film: Film, identity: Callable[[], dict[str, Any]]) -> None:
-        self._work, self._film, self._identity = work, film, identity
+    def __init__(
+        self, work: WorkFile | None, name: list[Any], film: Film, identity: Callable[[], dict[str, Any]]
+    ) -> None:
+        """`name`: of the pass, JSON."""
+        self._work, self._name, self._film, self._identity = work, name, film, identity
         self._started = time.perf_counter()
         self._waiting: list[tuple[Band, dict[str, Any], float]] = []
         self._writer = ThreadPoolExecutor(1)
@@ -56,7 +60,7 @@ class KeptBands:
         if not work.started:
             work.start(self._identity())
         for label, arrays in work.records():
-            if tuple(label["pass"]) == film.rectangle:
+            if label["pass"] == self._name:
                 band = Band(*label["band"])
                 film.take(band, arrays)
                 film.counts, self.seconds = label["counts"], label["seconds"]
@@ -88,22 +92,29 @@ class KeptBands:
             work.start(self._identity())
         waiting, self._waiting = self._waiting, []
         for band, counts, seconds in waiting:
-            place = {"pass": self._film.rectangle, "band": (band.x0, band.y0, band.x1, band.y1)}
+            place = {"pass": self._name, "band": (band.x0, band.y0, band.x1, band.y1)}
             work.keep(place | {"counts": counts, "seconds": seconds}, self._film.part(band))
 
 
 def identity_of(
-    scene: Scene, canvas: Canvas, rectangle: Rectangle, backend: Backend, n: int, layers: Sequence[str]
+    scene: Scene,
+    settings: Settings,
+    canvas: Canvas,
+    rectangle: Rectangle,
+    backend: Backend,
+    layers: Sequence[str],
 ) -> dict[str, Any]:
     """All that a picture depends on, by name: settings, the keys of the scene, and what its files hold."""
-    settings = {
+    n = settings.grid(scene)
+    named = {
         "tracer version": __version__,
         "backend": str(ensure_llvm()) if backend.name == "llvm" else backend.name,
         "precision": backend.precision,
         "resolution": [canvas.width, canvas.height],
         "scale": canvas.scale,
         "crop": rectangle,
-        "supersample": n,
+        "supersample": f"adaptive, at most {n}" if settings.adaptive else n,
+        "threshold": settings.threshold,
         "aov": layers,
     }
     keys, digests = _flat(scene.to_dict()), file_digests(scene)
@@ -112,7 +123,7 @@ def identity_of(
         for key, value in keys.items()
         if key.split(".")[-1] == "file"
     }
-    return settings | {key: _short(value) for key, value in keys.items()} | files
+    return named | {key: _short(value) for key, value in keys.items()} | files
 
 
 def _flat(tree: Any, path: str = "") -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""One launch: the pixels of a band through the loop, its layers in the order of the picture, its counts."""
+"""One launch: pixels through the loop; their layers, and what was counted."""
 
 from __future__ import annotations
 
@@ -12,36 +12,34 @@ from tracer.backends import Backend
 from tracer.canvas import DeviceCanvas
 from tracer.device_scene import DeviceScene
 from tracer.first_hits import FirstHits
-from tracer.pixels import BandPlace, pixels_of
+from tracer.pixels import Lanes, PixelGrid
 from tracer.replay import Program
-from tracer.tiles import lane_count
 from tracer.whitted import Counts, trace_pixels
 
 COUNTERS = tuple(f.name for f in fields(Counts))
 
 
 @Program
-def trace_band(
+def trace_lanes(
     device: DeviceScene,
     canvas: DeviceCanvas,
-    place: BandPlace,
-    size: tuple[int, int],
+    lanes: Lanes,
     first: FirstHits | None,
     layers: tuple[str, ...],
     shapes: int,
 ) -> dict[str, Any]:
-    """The layers of a band of `size` columns and rows, pixels in the order of the picture, components last,
-    and the counters of `COUNTERS` (1,), each under its `count_of`. `first`: see `first_hits`; `shapes`:
-    how many there are, if the rays that meet each are to be counted as `hits`, else 0."""
+    """The layers of the pixels of `lanes`, each in its place, components last, and the counters of `COUNTERS`
+    (1,), each under its `count_of`. `first`: see `first_hits`; `shapes`: how many there are, if the rays
+    that meet each are to be counted as `hits`, else 0."""
     backend = device.backend
-    pixels = pixels_of(backend, place, size, dr.arange(backend.UInt32, lane_count(*size)))
+    pixels = lanes.pixels(backend, dr.arange(backend.UInt32, lanes.count))
     met = dr.opaque(backend.UInt64, 0, shapes) if shapes else None
     found = trace_pixels(device, canvas, pixels, first, layers, met)
     values = {"color": found.color, "alpha": found.coverage, "depth": found.depth, "z": found.view_depth}
     if layers:
         values |= compute_layers(device, canvas, pixels, found, layers)
-    index = (pixels.row - place.y0) * backend.opaque_id(size[0]) + (pixels.column - place.x0)
-    picture = {name: _scattered(value, index, pixels.active, size) for name, value in values.items()}
+    places = lanes.places(backend, pixels)
+    picture = {name: _scattered(value, places, pixels, lanes.room) for name, value in values.items()}
     hits = {} if met is None else {count_of("hits"): met}
     return picture | _totals(backend, found.counts) | hits
 
@@ -58,15 +56,17 @@ def count_of(name: str) -> str:
     return f"number of {name}"
 
 
-def _scattered(value: Any, index: Any, active: Any, size: tuple[int, int]) -> Any:
-    """Values of lanes (components, n) in the order of the picture, components last.
+def _scattered(value: Any, places: Any, pixels: PixelGrid, room: int) -> Any:
+    """Values of lanes (components, n) at these places of a result with room for so many pixels, components
+    last.
 
     Each pixel is written by the one lane that owns it: no atomics.
     """
     components = list(value) if isinstance(value, list) or dr.depth_v(value) > 1 else [value]
-    target = dr.empty(type(components[0]), size[0] * size[1] * len(components))
+    target = dr.empty(type(components[0]), room * len(components))
     for k, component in enumerate(components):
-        dr.scatter(target, component, index * len(components) + k, active, mode=dr.ReduceMode.Permute)
+        index = places * len(components) + k
+        dr.scatter(target, component, index, pixels.active, mode=dr.ReduceMode.Permute)
     return target
 
 

@@ -40,6 +40,8 @@ def pixel_tree(
     """The tree of rays of pixel (column x, row y) of the picture that `tracer.render` gives with the same
     settings; raises what that raises, and `UsageError` for a pixel outside the picture."""
     settings = Settings(precision, backend, supersample, (), scale, resolution, seed=seed).checked()
+    if settings.adaptive:
+        raise UsageError("supersample: the tree of a pixel shows all its sub-rays; allowed is 1 to 64")
     types = find_backend(settings.backend, settings.precision)
     scene = with_seed(scene, seed)
     canvas = picture_canvas(scene, settings)
@@ -48,7 +50,7 @@ def pixel_tree(
             f"pixel: {x} {y} is outside the picture; allowed is 0 <= X < {canvas.width} "
             f"and 0 <= Y < {canvas.height}"
         )
-    n = settings.supersample or scene.camera.supersample
+    n = settings.grid(scene)
     with exact_arithmetic():
         lens = _Lens(scene, compile_scene(scene, types))
         roots = lens.look(DeviceCanvas.of(types, canvas), x, y, y * canvas.width + x, n)

@@ -30,6 +30,13 @@ FIRST_TRIANGLE = 12
 """Bytes of a primary ray, of the search for its first triangle."""
 
 
+LISTED_BYTES = 24
+"""A pixel of a launch whose pixels come from a list: the list, on both sides."""
+
+NOTED_BYTES = 10
+"""A pixel of a picture: that it is to be refined."""
+
+
 @dataclass(frozen=True)
 class Need:
     """Bytes of a pass: `fixed`, and for each pixel and each primary ray of a launch."""
@@ -43,14 +50,18 @@ class Need:
         return self.fixed + pixels * (self.pixel + self.ray * sub_rays)
 
 
-def need_of(scene: Scene, layers: list[str], pixels: int, real: int, triangles: bool) -> Need:
-    """What a pass over so many pixels takes; `real`: bytes of a number, 4 or 8."""
+def need_of(
+    scene: Scene, layers: list[str], pixels: int, real: int, triangles: bool, adaptive: bool = False
+) -> Need:
+    """What a pass over so many pixels takes; `real`: bytes of a number, 4 or 8. An adaptive picture has a
+    film of refined pixels as well."""
     numbers = 6 + sum(_components(scene, name) for name in layers)
     film = numbers * real
     written = numbers * 4 + 12
     filtered = FILTER_BYTES if scene.camera.depth_of_field is not None else 0
-    fixed = _process() + KERNELS + pixels * (film + max(written, filtered))
-    return Need(fixed, pixel=2 * film + 32, ray=_bundle_bytes(real) if triangles else 0)
+    refined, listed = (film + NOTED_BYTES, LISTED_BYTES) if adaptive else (0, 0)
+    fixed = _process() + KERNELS + pixels * (film + refined + max(written, filtered))
+    return Need(fixed, pixel=2 * film + 32 + listed, ray=_bundle_bytes(real) if triangles else 0)
 
 
 def rays_that_fit(need: Need, sub_rays: int, limit: int | None, most: int = RAYS_PER_BAND) -> int:

@@ -17,16 +17,19 @@ from tracer.film.layout import VISIBILITY
 from tracer.film.work_file import WorkFile
 from tracer.first_hits import first_hits
 from tracer.kept_bands import KeptBands, identity_of
-from tracer.launch import COUNTERS, counts_of, trace_band
+from tracer.launch import COUNTERS, counts_of, trace_lanes
 from tracer.memory import need_of, rays_that_fit
 from tracer.phases import Phases
-from tracer.pixels import BandPlace
+from tracer.pixels import BandLanes, Lanes
 from tracer.scene import Scene
 from tracer.settings import Settings, picture_canvas, picture_rectangle
 from tracer.tiles import Band, Rectangle, bands
 
 Progress = Callable[[int, int, int], None]
 """(finished pixels, all pixels, rays traced by this run), called at first and after every band."""
+
+Found = tuple[dict[str, np.ndarray], dict[str, Any]]
+"""What a launch finds: layers, each of all its pixels, components last; counts."""
 
 
 class PassInterrupted(KeyboardInterrupt):
@@ -38,7 +41,7 @@ class PassInterrupted(KeyboardInterrupt):
 
 
 class Passes:
-    """Traces rectangles of one picture; `n`: each pixel is the mean of n x n sub-rays."""
+    """Traces rectangles of one picture; `n`: each pixel is the mean of at most n x n sub-rays."""
 
     def __init__(
         self,
@@ -51,77 +54,88 @@ class Passes:
         self.scene, self.settings, self.backend = scene, settings, backend
         self.canvas = picture_canvas(scene, settings)
         self.rectangle = picture_rectangle(settings.crop, self.canvas)
-        self.n = settings.supersample or scene.camera.supersample
+        self.n = settings.grid(scene)
         self.layers = [name for name in settings.aovs if name in layers_of(scene)]
         self.phases = Phases()
-        self._progress, self._work = progress, work
+        self.progress = progress or (lambda done, total, rays: None)
+        self._work = work
         self._counted_shapes = len(scene.shapes) if settings.count_hits else 0
         with self.phases.phase("build"):
             self._device = compile_scene(scene, backend)
-            self._device_canvas = DeviceCanvas.of(backend, self.canvas)
+            self.device_canvas = DeviceCanvas.of(backend, self.canvas)
 
     def over(self, rectangle: Rectangle) -> Film:
-        """The film of a rectangle. Raises `PassInterrupted`."""
-        film = self._empty_film(rectangle)
-        with self.phases.phase("trace"):
-            self._run(film)
+        """The film of a rectangle, all sub-rays of all pixels traced. Raises `PassInterrupted`."""
+        film = self.empty_film(rectangle)
+        rays = self.rays_at_once(rectangle, self.n**2)
+
+        def trace(band: Band) -> Found:
+            lanes = BandLanes.of(self.backend, band, self.canvas.width, self.n)
+            return self.launch(lanes, self.device_canvas, self.n)
+
+        def cut(rest: Rectangle) -> Iterable[Band]:
+            return bands(rest, self.n**2, rays)
+
+        self.run(film, list(rectangle), cut, trace, lambda done, rays: self.progress(done, film.pixels, rays))
         return film
 
-    def _empty_film(self, rectangle: Rectangle) -> Film:
+    def run(
+        self,
+        film: Film,
+        name: list[Any],
+        cut: Callable[[Rectangle], Iterable[Band]],
+        trace: Callable[[Band], Found],
+        report: Callable[[int, int], None],
+    ) -> int:
+        """Fills a film, band by band; returns how many rays that took in this run. Raises `PassInterrupted`.
+
+        `name`: of the pass in the work file, JSON; `cut`: what remains into bands; `report`: is told of
+        finished pixels and of the rays of this run.
+        """
+        with self.phases.phase("trace"), KeptBands(self._work, name, film, self._identity) as kept:
+            remaining = kept.restore()
+            self.phases.seconds["trace"] += kept.seconds
+            earlier = number_of_rays(film.counts)
+            try:
+                report(film.finished, 0)
+                for band in (band for rest in remaining for band in cut(rest)):
+                    layers, counts = trace(band)
+                    counts["primary"] *= band.width * band.height
+                    film.take(band, layers)
+                    film.counts = together(film.counts, counts)
+                    self.phases.count_kernels()
+                    kept.finished(band)
+                    report(film.finished, number_of_rays(film.counts) - earlier)
+            except KeyboardInterrupt:
+                kept.finish()
+                raise PassInterrupted(film) from None
+        return number_of_rays(film.counts) - earlier
+
+    def launch(self, lanes: Lanes, canvas: DeviceCanvas, n: int) -> Found:
+        """The layers of the pixels of `lanes`, and what was counted; primary rays of each pixel."""
+        first = first_hits(self._device, self.canvas, canvas, lanes, n)
+        found = trace_lanes(self._device, canvas, lanes, first, tuple(self.layers), self._counted_shapes)
+        counts = counts_of(found) | {"primary": n * n}
+        return {name: values.numpy() for name, values in found.items()}, counts
+
+    def empty_film(self, rectangle: Rectangle) -> Film:
+        """A film of which nothing is traced."""
         counts: dict[str, Any] = dict.fromkeys(("primary", *COUNTERS), 0)
         if self._counted_shapes:
             counts["hits"] = [0] * self._counted_shapes
         return Film(rectangle, self.backend.dtype, counts)
 
-    def _run(self, film: Film) -> None:
-        with KeptBands(self._work, film, self._identity) as kept:
-            remaining = kept.restore()
-            self.phases.seconds["trace"] += kept.seconds
-            earlier = number_of_rays(film.counts)
-            try:
-                self._report(film, earlier)
-                for band in self._cut(remaining, film.rectangle):
-                    self._trace_band(film, band)
-                    self.phases.count_kernels()
-                    kept.finished(band)
-                    self._report(film, earlier)
-            except KeyboardInterrupt:
-                kept.finish()
-                raise PassInterrupted(film) from None
-
-    def _cut(self, rectangles: Iterable[Rectangle], whole: Rectangle) -> Iterable[Band]:
-        """Bands as large as was asked for, or smaller, if memory is short."""
-        x0, y0, x1, y1 = whole
+    def rays_at_once(self, rectangle: Rectangle, sub_rays: int) -> int:
+        """As many as were asked for, or fewer, if memory is short."""
+        x0, y0, x1, y1 = rectangle
         real, triangles = np.dtype(self.backend.dtype).itemsize, self._device.triangles is not None
-        need = need_of(self.scene, self.layers, (x1 - x0) * (y1 - y0), real, triangles)
-        sub_rays = self.n**2
-        rays = rays_that_fit(need, sub_rays, self.settings.memory, self.settings.rays_per_band)
-        return (band for rectangle in rectangles for band in bands(rectangle, sub_rays, rays))
-
-    def _report(self, film: Film, earlier: int) -> None:
-        if self._progress is not None:
-            x0, y0, x1, y1 = film.rectangle
-            self._progress(film.finished, (x1 - x0) * (y1 - y0), number_of_rays(film.counts) - earlier)
+        pixels, adaptive = (x1 - x0) * (y1 - y0), self.settings.adaptive
+        need = need_of(self.scene, self.layers, pixels, real, triangles, adaptive)
+        return rays_that_fit(need, sub_rays, self.settings.memory, self.settings.rays_per_band)
 
     def _identity(self) -> dict[str, Any]:
         """What a work file must agree in."""
-        return identity_of(self.scene, self.canvas, self.rectangle, self.backend, self.n, self.layers)
-
-    def _trace_band(self, film: Film, band: Band) -> None:
-        backend = self.backend
-        place = BandPlace(
-            x0=backend.opaque_id(band.x0),
-            y0=backend.opaque_id(band.y0),
-            width=backend.opaque_id(self.canvas.width),
-            n=backend.opaque_id(self.n),
-        )
-        size = (band.width, band.height)
-        first = first_hits(self._device, self.canvas, self._device_canvas, place, size, self.n)
-        layers, shapes = tuple(self.layers), self._counted_shapes
-        found = trace_band(self._device, self._device_canvas, place, size, first, layers, shapes)
-        counts = counts_of(found) | {"primary": band.width * band.height * self.n**2}
-        film.take(band, {name: values.numpy() for name, values in found.items()})
-        film.counts = together(film.counts, counts)
+        return identity_of(self.scene, self.settings, self.canvas, self.rectangle, self.backend, self.layers)
 
 
 def layers_of(scene: Scene) -> list[str]:

@@ -6,9 +6,11 @@ import hashlib
 import json
 from collections.abc import Sequence
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
+from tracer.adaptive import Adaptive
 from tracer.backends import exact_arithmetic, find_backend, thread_count
 from tracer.color import encode_srgb
 from tracer.film.counts import by_name
@@ -36,7 +38,7 @@ def render(
     scene: Scene,
     precision: str = "single",
     backend: str = "auto",
-    supersample: int | None = None,
+    supersample: int | Literal["adaptive"] | None = None,
     aovs: Sequence[str] = ("depth",),
     *,
     scale: float = 1.0,
@@ -49,6 +51,7 @@ def render(
     progress: Progress | None = None,
     work: WorkFile | None = None,
     count_hits: bool = False,
+    threshold: float | None = None,
 ) -> Result:
     """Renders a scene.
 
@@ -56,7 +59,8 @@ def render(
         scene: from `tracer.load` or built in code.
         precision: "single" or "double".
         backend: "auto" (CUDA where there is a GPU, else LLVM), "llvm" or "cuda".
-        supersample: n for n x n rays a pixel, 1 to 64; None: as the scene says.
+        supersample: n for n x n rays a pixel, 1 to 64; None: as the scene says; "adaptive": one ray, and all
+            n x n only of pixels that differ from a neighbor, n as the scene says, or 3 where that is 1.
         aovs: names of layers, or "all"; `docs/layers.md` has the list.
         scale: size of the picture against the scene's resolution; the framing stays.
         resolution: (width, height) in pixels instead; the vertical extent of the canvas stays.
@@ -71,6 +75,8 @@ def render(
             when the result is saved. Pictures of less than a second keep nothing.
         count_hits: count for each shape the rays, of all kinds but shadow rays, that meet it, as
             `stats["hits"]`, in the order of the shapes. It takes a kernel of its own; no pixel depends on it.
+        threshold: of an adaptive picture: pixels whose display values, or coverage, differ by so much or more
+            are refined; 0 (all of them, the bytes of the full grid) to 1; None: 0.015.
 
     Returns: `color` (h, w, 3) float32 (float64 in double precision), display-referred and not clamped;
         `depth` (h, w), distance from the canvas along the ray, -1 blank; `alpha`, `z`, `aovs`, `stats`.
@@ -92,6 +98,7 @@ def render(
         rays_per_band,
         memory,
         count_hits,
+        threshold,
     ).checked()
     types = find_backend(settings.backend, settings.precision)
     with exact_arithmetic(), thread_count(settings.threads):
@@ -104,12 +111,13 @@ def render(
 
 def _finished(passes: Passes) -> Film:
     """The film of the picture, filtered and display-referred."""
-    film = passes.over(passes.rectangle)
+    trace = Adaptive(passes).over if passes.settings.adaptive else passes.over
+    film = trace(passes.rectangle)
     scene, canvas, settings = passes.scene, passes.canvas, passes.scene.camera.depth_of_field
     if settings is not None and settings.focus >= 0:
         # a crop's first pass is widened to what the filter reads
         wide = rectangle_needed(film.rectangle, film.depth, settings, canvas)
-        source = film if wide == film.rectangle else passes.over(wide)
+        source = film if wide == film.rectangle else trace(wide)
         with passes.phases.phase("filter"):
             given = source.color, source.depth, source.rectangle
             film.color = depth_of_field(passes.backend, *given, film.rectangle, settings, canvas)
@@ -130,6 +138,7 @@ def _result(passes: Passes, film: Film) -> Result:
         aovs=layers | {name: film.arrays[name] for name in passes.layers if name in film.arrays},
         stats={
             **by_name(film.counts),
+            **({"threshold": passes.settings.threshold} if passes.settings.adaptive else {}),
             "seconds": dict(passes.phases.seconds),
             "pixels": int(film.depth.size),
             "supersample": passes.n,

@@ -12,11 +12,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
+import numpy as np
 
 from tracer.backends import Backend
 
 TILE = 8
 _PIXELS = TILE * TILE
+
+_PLACES = np.arange(_PIXELS)
+_MORTON = np.sum([((_PLACES >> bit) & 1) << (bit // 2 + 3 * (bit % 2)) for bit in range(6)], axis=0)
+"""For each lane of a tile its row times 8 plus its column: the bits of column and row in turn."""
 
 FEWEST_PIXELS = 2 * _PIXELS
 """Of a launch; see `_tiles_across`."""
@@ -78,6 +83,25 @@ def _tiles_across(width: int) -> int:
 def lane_count(width: int, height: int) -> int:
     """Lanes of a launch: all pixels of the tiles that cover a band of that size."""
     return _tiles_across(width) * -(-height // TILE) * _PIXELS
+
+
+def few_lengths(count: int) -> int:
+    """The next of few numbers of lanes, of whole tiles: between four and eight from a power of two to the
+    next."""
+    step = max(_PIXELS, 1 << max(0, count.bit_length() - 3))
+    return -(-count // step) * step
+
+
+def tile_order(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Columns and rows of the pixels of a mask (h, w), in the order of lanes."""
+    height, width = (-(-size // TILE) for size in mask.shape)
+    padded = np.zeros((height * TILE, width * TILE), bool)
+    padded[: mask.shape[0], : mask.shape[1]] = mask
+    tiles = padded.reshape(height, TILE, width, TILE).transpose(0, 2, 1, 3).reshape(-1, _PIXELS)
+    tile, place = np.divmod(np.flatnonzero(tiles[:, _MORTON]), _PIXELS)
+    row, column = np.divmod(tile, width)
+    inner_row, inner_column = np.divmod(_MORTON[place], TILE)
+    return column * TILE + inner_column, row * TILE + inner_row
 
 
 def lane_pixels(backend: Backend, width: int, height: int, lane: Any) -> tuple[Any, Any, Any]:

@@ -15,6 +15,7 @@ from tracer.film.work_file import WorkFile
 from tracer.render import RenderInterrupted
 
 SETTINGS: dict[str, Any] = {"aovs": ("depth", "normal", "shape"), "supersample": 2}
+ADAPTIVE: dict[str, Any] = SETTINGS | {"supersample": "adaptive", "threshold": 0.02, "count_hits": True}
 
 
 @pytest.fixture(autouse=True)
@@ -38,7 +39,7 @@ def pieces(scene: tracer.Scene, file: Path, sizes: list[int], **settings: Any) -
         size = sizes[run % len(sizes)]
         try:
             return tracer.render(
-                scene, rays_per_band=size, progress=progress, work=work, **SETTINGS, **settings
+                scene, rays_per_band=size, progress=progress, work=work, **(SETTINGS | settings)
             )
         except RenderInterrupted as interrupted:
             assert (interrupted.partial.depth != -1).any() or run < 3
@@ -49,14 +50,15 @@ def pieces(scene: tracer.Scene, file: Path, sizes: list[int], **settings: Any) -
 
 @pytest.mark.parametrize("sizes", [[3000], [1024, 9000, 512]])
 @pytest.mark.parametrize("crop", [None, (3, 2, 30, 21)])
+@pytest.mark.parametrize("settings", [SETTINGS, ADAPTIVE], ids=["full grid", "adaptive"])
 def test_resumed_pictures_are_the_same(
-    sizes: list[int], crop: tuple[int, int, int, int] | None, tmp_path: Path
+    settings: dict[str, Any], sizes: list[int], crop: tuple[int, int, int, int] | None, tmp_path: Path
 ) -> None:
     table = worlds.FEATURES["disk jitter"]()
     table["camera"] = table["camera"] | {"depth_of_field": {"focus": 20.0, "samples": 4, "seed": 3}}
     scene = tracer.load(table)
-    whole = tracer.render(scene, crop=crop, **SETTINGS)
-    resumed = pieces(scene, tmp_path / "a.work", sizes, crop=crop)
+    whole = tracer.render(scene, crop=crop, **settings)
+    resumed = pieces(scene, tmp_path / "a.work", sizes, crop=crop, **settings)
     assert resumed.color.tobytes() == whole.color.tobytes()
     for name, layer in whole.aovs.items():
         assert resumed.aovs[name].tobytes() == layer.tobytes()

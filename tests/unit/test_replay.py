@@ -180,7 +180,7 @@ def test_a_frame_is_traced_in_python_once(monkeypatch: pytest.MonkeyPatch) -> No
     scene.shapes[3] = scene.shapes[3].model_copy(update={"center": (0.5, 1.3, 1.0)})
     pictures.append(frame(40, 30))
     assert len(traced) == 1 and len(set(pictures)) == 3
-    module.trace_band.forget()
+    module.trace_lanes.forget()
     assert frame(40, 30) == pictures[2] and len(traced) == 2
     frame(48, 30)
     assert len(traced) == 3

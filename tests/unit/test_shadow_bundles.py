@@ -19,11 +19,10 @@ from tracer.acceleration.shadows_of_bundles import HIDDEN, LIT
 from tracer.backends import Backend, exact_arithmetic, find_backend
 from tracer.canvas import Canvas, DeviceCanvas
 from tracer.device_scene import compile_scene
-from tracer.pixels import BandPlace
-from tracer.tiles import lane_count
+from tracer.pixels import BandLanes
+from tracer.tiles import Band
 
 Array = np.ndarray
-SIZE = (PIXELS, PIXELS)
 
 
 def lights(corners: Array) -> Array:
@@ -45,17 +44,15 @@ def answers(corners: Array, light: Array, canvas: Canvas, backend: Backend) -> t
     }
     scene = tracer.load(tree)
     device, on_device = compile_scene(scene, backend), DeviceCanvas.of(backend, canvas)
-    place = BandPlace(*(backend.opaque_id(n) for n in (0, 0, PIXELS, 1)))
-    numbers = dr.arange(backend.UInt32, lane_count(*SIZE))
+    lanes = BandLanes.of(backend, Band(0, 0, PIXELS, PIXELS), PIXELS, 1)
+    numbers = dr.arange(backend.UInt32, lanes.count)
     with exact_arithmetic():
-        primitives = first_hits.singly(device, on_device, place, SIZE, numbers)["primitive"]
-        points = first_shadows.lit_points(device, on_device, place, SIZE, primitives)
+        primitives = first_hits.singly(device, on_device, lanes, numbers)["primitive"]
+        points = first_shadows.lit_points(device, on_device, lanes, primitives)
         where = list(points.values())
         (sample,) = first_shadows.lights_asked(device)[0].samples
         found = first_shadows.bundled(device, sample.position, where)["hidden"].numpy()
-        alone = first_shadows.singly(device, on_device, place, SIZE, primitives, sample, numbers)[
-            "hidden"
-        ].numpy()
+        alone = first_shadows.singly(device, on_device, lanes, primitives, sample, numbers)["hidden"].numpy()
     return found, alone, where[-1].numpy() > 0
 
 

@@ -28,6 +28,21 @@ class Size(click.ParamType):
         return int(float(found.group(1)) * 1024 ** " KMGT".index(found.group(2).upper() or " "))
 
 
+class SubRays(click.ParamType):
+    """A number of sub-rays in each direction, or `adaptive`."""
+
+    name = "sub-rays"
+    _numbers = click.IntRange(1, 64)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The number, or the word."""
+        if value == "adaptive":
+            return value
+        if not re.fullmatch(r"[+-]?\d+", str(value).strip(), re.ASCII):
+            self.fail(f"{value!r} is no number; allowed: 1 to 64, or adaptive", param, ctx)
+        return self._numbers.convert(value, param, ctx)
+
+
 def scene_options(command: Command) -> Command:
     """`--set` and `--allow-outside`: how a scene is loaded."""
     command = click.option(
@@ -105,7 +120,18 @@ _PICTURE_OPTIONS = (
         metavar="W H",
         help="Size in pixels; the vertical extent of the canvas stays.",
     ),
-    click.option("--supersample", type=click.IntRange(1, 64), metavar="N", help="N x N rays a pixel."),
+    click.option(
+        "--supersample",
+        type=SubRays(),
+        metavar="N",
+        help="N x N rays a pixel; adaptive: those of the scene, or 3 x 3, where neighbors differ, else one.",
+    ),
+    click.option(
+        "--threshold",
+        type=float,
+        metavar="T",
+        help="By how much they differ for --supersample adaptive, 0 to 1.  [default: 0.015]",
+    ),
     click.option(
         "--crop", type=int, nargs=4, metavar="X0 Y0 X1 Y1", help="Only these pixels, end exclusive."
     ),

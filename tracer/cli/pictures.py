@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 
@@ -39,7 +39,8 @@ class Wishes:
     allow_outside: bool
     scale: float
     resolution: tuple[int, int] | None
-    supersample: int | None
+    supersample: int | Literal["adaptive"] | None
+    threshold: float | None
     crop: tuple[int, int, int, int] | None
     precision: str
     backend: str
@@ -63,6 +64,7 @@ class Wishes:
             "scale",
             "resolution",
             "supersample",
+            "threshold",
             "crop",
             "precision",
             "backend",

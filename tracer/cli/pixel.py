@@ -23,6 +23,8 @@ def show_pixels(sources: Sequence[str], pixel: tuple[int, int], wishes: Wishes, 
 
     if wishes.outputs:
         raise UsageError("--pixel: writes no picture; leave out either --pixel or -o")
+    if wishes.threshold is not None:
+        raise UsageError("--pixel: a pixel shows all its sub-rays; leave out --threshold")
     names = ("scale", "resolution", "supersample", "precision", "backend", "seed")
     settings = {name: getattr(wishes, name) for name in names}
     worst = 0

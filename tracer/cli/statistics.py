@@ -43,7 +43,7 @@ def peak_memory() -> int | None:
 def picture_statistics(result: Result, scene: Scene, seconds: Mapping[str, float]) -> dict[str, Any]:
     """All that is told of one picture, ready for JSON; `seconds` by phase, in the order in which they
     passed."""
-    settings = ("supersample", "backend", "precision")
+    settings = [name for name in ("supersample", "threshold", "backend", "precision") if name in result.stats]
     return {
         "scene": result.scene_name,
         "scene_hash": result.scene_hash,
@@ -96,7 +96,11 @@ def count_rows(statistics: Mapping[str, Any]) -> list[tuple[str, str]]:
     """The rows of a report that say what was counted."""
     rays = statistics["rays"]
     kinds = _listed(f"{kind.replace('_', ' ')} {count}" for kind, count in rays.items())
+    refined = (
+        [("refined", f"{statistics['refined_pixels']} pixels")] if "refined_pixels" in statistics else []
+    )
     return [
+        *refined,
         ("rays", f"{sum(rays.values())}: {kinds}"),
         ("hits", _most_hit(statistics["hits"])),
         ("deepest level", str(statistics["deepest_level"])),

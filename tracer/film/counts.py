@@ -12,8 +12,17 @@ from typing import Any
 RAYS = ("primary", "shadow", "reflected", "refracted", "total_reflection")
 """Kinds of rays."""
 
-COUNTS = ("rays", "total_internal", "ended_by_cutoff", "ended_by_depth", "deepest_level", "hits")
-"""What of `Result.stats` are counts; `hits`, a number a shape, only where they were asked for."""
+COUNTS = (
+    "rays",
+    "total_internal",
+    "ended_by_cutoff",
+    "ended_by_depth",
+    "deepest_level",
+    "hits",
+    "refined_pixels",
+)
+"""What of `Result.stats` are counts; `hits`, a number a shape, only where they were asked for,
+`refined_pixels` only in adaptive pictures."""
 
 _LARGEST = "deepest_level"
 
@@ -54,6 +63,7 @@ def header_of(stats: Mapping[str, Any]) -> dict[str, str | int]:
         "deepest_level": "deepestLevel",
         "ended_by_cutoff": "pathsEndedByWeight",
         "ended_by_depth": "pathsEndedByDepth",
+        "refined_pixels": "refinedPixels",
     }
     found |= {attribute: stats[name] for name, attribute in names.items() if name in stats}
     hits = {"hitsPerShape": " ".join(map(str, stats["hits"]))} if "hits" in stats else {}

@@ -28,6 +28,16 @@ class Film:
         self.finished = 0
         self._dtype = dtype
 
+    @property
+    def pixels(self) -> int:
+        """All of them."""
+        x0, y0, x1, y1 = self.rectangle
+        return (x1 - x0) * (y1 - y0)
+
+    def blank_copy(self, rectangle: Rectangle) -> Film:
+        """A film of another rectangle, with the same counts, that holds nothing."""
+        return Film(rectangle, self._dtype, self.counts)
+
     def take(self, band: Band, layers: dict[str, np.ndarray]) -> None:
         """Adds a finished band; each array holds its pixels in order, components last."""
         x0, y0, x1, y1 = self.rectangle
