@@ -9,8 +9,9 @@ bytes that it has in the full grid.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -35,60 +36,63 @@ class Adaptive:
     def over(self, rectangle: Rectangle) -> Film:
         """The film of a rectangle; its counts are those of both passes, and of pixels around it that decided
         along with it. Raises `PassInterrupted`."""
-        passes = self._passes
+        passes, progress = self._passes, self._passes.progress
         x0, y0, x1, y1 = rectangle
-        wide = (
-            max(0, x0 - MARGIN),
-            max(0, y0 - MARGIN),
-            min(passes.canvas.width, x1 + MARGIN),
-            min(passes.canvas.height, y1 + MARGIN),
+        first = passes.empty_film(
+            (
+                max(0, x0 - MARGIN),
+                max(0, y0 - MARGIN),
+                min(passes.canvas.width, x1 + MARGIN),
+                min(passes.canvas.height, y1 + MARGIN),
+            )
         )
-        at_once = passes.rays_at_once(wide, 1), passes.rays_at_once(wide, passes.n**2)
-        first = passes.empty_film(wide)
+        at_once, at_once_refined = (passes.rays_at_once(first.rectangle, rays) for rays in (1, passes.n**2))
         steps = first.pixels + (x1 - x0) * (y1 - y0)
         try:
-            rays = self._first_pass(first, at_once[0], steps)
-        except PassInterrupted as interrupted:
-            raise PassInterrupted(_part_of(interrupted.film, rectangle)) from None
+            before = self._first_pass(first, at_once, lambda done, rays: progress(done, steps, rays))
+        except PassInterrupted:
+            raise PassInterrupted(_part_of(first, rectangle)) from None
         with passes.phases.phase("trace"):
             linear = passes.scene.color_space == "linear"
             columns, rows = differing_pixels(first, rectangle, self._threshold, linear)
-        film = _part_of(first, rectangle)
-        refined = passes.empty_film((0, 0, 1, len(columns)))
+        film, refined = _part_of(first, rectangle), passes.empty_film((0, 0, 1, len(columns)))
+        settled = steps - len(columns)
+
+        def report(done: int, rays: int) -> None:
+            progress(settled + done, steps, before + rays)
+
         try:
-            self._refine(refined, columns, rows, at_once[1], (rectangle, steps, rays))
+            self._refine(refined, ["refined", *rectangle], (columns, rows), at_once_refined, report)
         except PassInterrupted:
             _put(film, refined, columns, rows)
             raise PassInterrupted(film) from None
         _put(film, refined, columns, rows)
         return film
 
-    def _first_pass(self, film: Film, at_once: int, steps: int) -> int:
+    def _first_pass(self, film: Film, at_once: int, report: Callable[[int, int], None]) -> int:
+        """One ray a pixel; returns the rays of this run."""
         passes = self._passes
+
+        def cut(rest: Rectangle) -> Iterator[Band]:
+            return bands(rest, 1, at_once)
 
         def trace(band: Band) -> Found:
             lanes = ListedLanes.of_band(passes.backend, band, passes.canvas.width, 1)
             return passes.launch(lanes, self._middle_ray, 1)
 
-        return passes.run(
-            film,
-            ["first", *film.rectangle],
-            lambda rest: bands(rest, 1, at_once),
-            trace,
-            lambda done, rays: passes.progress(done, steps, rays),
-        )
+        return passes.run(film, ["first", *film.rectangle], cut, trace, report)
 
     def _refine(
         self,
         film: Film,
-        columns: np.ndarray,
-        rows: np.ndarray,
+        name: list[Any],
+        pixels: tuple[np.ndarray, np.ndarray],
         at_once: int,
-        before: tuple[Rectangle, int, int],
+        report: Callable[[int, int], None],
     ) -> None:
-        """Fills a film that is one pixel wide, with a row for each pixel of the list."""
+        """All sub-rays of the pixels of a list, columns and rows (k,): a film one pixel wide and k high."""
         passes, n = self._passes, self._passes.n
-        rectangle, steps, rays_before = before
+        columns, rows = pixels
         height = max(FEWEST_PIXELS, at_once // n**2)
 
         def cut(rest: Rectangle) -> Iterator[Band]:
@@ -99,15 +103,11 @@ class Adaptive:
             part = slice(band.y0, band.y1)
             lanes = ListedLanes.of_pixels(passes.backend, columns[part], rows[part], passes.canvas.width, n)
             layers, counts = passes.launch(lanes, passes.device_canvas, n)
-            return {name: v.reshape(lanes.room, -1)[: band.height] for name, v in layers.items()}, counts
+            return {
+                layer: values.reshape(lanes.room, -1)[: band.height] for layer, values in layers.items()
+            }, counts
 
-        passes.run(
-            film,
-            ["refined", *rectangle],
-            cut,
-            trace,
-            lambda done, rays: passes.progress(steps - len(columns) + done, steps, rays_before + rays),
-        )
+        passes.run(film, name, cut, trace, report)
 
 
 def _part_of(film: Film, rectangle: Rectangle) -> Film:

@@ -35,8 +35,8 @@ def lights_asked(scene: DeviceScene) -> list[UnrolledLight]:
 
 
 def first_shadows(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, primitives: Any) -> list[Any]:
-    """For each of `lights_asked` and every primary ray of a launch (lanes n n,), `HIDDEN` where triangles hide
-    the light from the point that it meets first. `primitives`: the triangles that they meet."""
+    """For each of `lights_asked` and every primary ray of a launch (lanes n n,), `HIDDEN` where triangles
+    hide the light from the point that it meets first. `primitives`: the triangles that they meet."""
     lights = lights_asked(scene)
     if not lights:
         return []

@@ -40,6 +40,8 @@ def test_more_pixels_and_layers_need_more() -> None:
     assert layered.fixed - plain.fixed > 4 * 4 * 10**6
     assert layered.pixel > plain.pixel
     assert need_of(scene, [], 2 * 10**6, 4, False).fixed - plain.fixed > 24 * 10**6
+    adaptive = need_of(scene, [], 10**6, 4, False, adaptive=True)
+    assert adaptive.fixed - plain.fixed > 24 * 10**6 and adaptive.pixel > plain.pixel
 
 
 @pytest.mark.parametrize(
