@@ -36,7 +36,7 @@ from tracer.suspects import find_suspects
 @dataclass
 class Shadows:
     """What is known of triangles between lights of one sample and hits: mask `known` (n,) of those hits, and
-    for each such light whether one is `hidden` (n,)."""
+    for the first few of such lights whether one is `hidden` (n,)."""
 
     known: Any
     hidden: list[Any]
@@ -136,12 +136,12 @@ def _dark_samples(
     if not lights or not (crowded or any(areas)):
         return dark
     suspects, todo = [], dr.zeros(backend.UInt32, width)
-    known = iter([] if shadows is None else shadows.hidden)
+    known = [] if shadows is None else list(shadows.hidden)
     for light, faces, is_area in zip(lights, facing, areas, strict=True):
         who = find_suspects(scene, surface, light.ball, faces, spheres=is_area, beams=is_area)
-        if shadows is not None and not is_area:
+        if shadows is not None and known and not is_area:
             who.meshes &= ~shadows.known
-            who.umbra |= shadows.known & next(known)
+            who.umbra |= shadows.known & known.pop(0)
         bits = ((1 << len(light.samples)) - 1) << light.first
         todo |= dr.select(faces & who.doubtful, backend.UInt32(bits), 0)
         dark |= dr.select(who.umbra, backend.UInt32(bits), 0)

@@ -16,9 +16,9 @@ from tracer.lights import LightRecord
 from tracer.random import JITTER_STREAM, fraction, philox
 from tracer.shafts import Ball, ball_around
 
-UNROLLED_LIGHTS, UNROLLED_SAMPLES = 4, 32
-"""Up to so many lights with so many samples in all stand in the kernel one by one; more are looped over. One
-bit a sample must fit a word."""
+UNROLLED_LIGHTS, UNROLLED_SAMPLES = 16, 32
+"""Up to so many lights with so many samples in all stand in the kernel one by one; more are looped over,
+which takes twice as long. One bit a sample must fit a word; 16 lights take half a second to compile."""
 
 ROW = 16
 """Floats of a sample: base (3), A (3), first, B (3), second, color times share of the light (3), its part of

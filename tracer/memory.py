@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from tracer.errors import MachineError, UsageError
 from tracer.film.layout import COMPONENTS, VISIBILITY
-from tracer.light_tables import UNROLLED_LIGHTS
+from tracer.first_shadows import MOST_LIGHTS
 from tracer.scene import Scene
 from tracer.settings import RAYS_PER_BAND
 from tracer.tiles import FEWEST_PIXELS
@@ -99,7 +99,7 @@ def _components(scene: Scene, name: str) -> int:
 
 def _bundle_bytes(real: int) -> int:
     """The same, with the point there and what hides lights from it."""
-    return FIRST_TRIANGLE + 4 + 3 * real + UNROLLED_LIGHTS * (real + 4)
+    return FIRST_TRIANGLE + 4 + 3 * real + MOST_LIGHTS * (real + 4)
 
 
 def _process() -> int:
