@@ -12,7 +12,8 @@ from tracer.backends import Backend
 from tracer.canvas import DeviceCanvas
 from tracer.device_scene import DeviceScene
 from tracer.first_hits import FirstHits
-from tracer.pixels import Lanes, PixelGrid
+from tracer.pixel_records import scattered
+from tracer.pixels import Lanes
 from tracer.replay import Program
 from tracer.whitted import Counts, trace_pixels
 
@@ -28,8 +29,8 @@ def trace_lanes(
     layers: tuple[str, ...],
     shapes: int,
 ) -> dict[str, Any]:
-    """The layers of the pixels of `lanes`, each in its place, components last, and the counters of `COUNTERS`
-    (1,), each under its `count_of`. `first`: see `first_hits`; `shapes`: how many there are, if the rays
+    """The layers of the pixels of `lanes` as records, each in its place, and the counters of `COUNTERS` (1,),
+    each under its `count_of`. `first`: see `first_hits`; `shapes`: how many there are, if the rays
     that meet each are to be counted as `hits`, else 0."""
     backend = device.backend
     pixels = lanes.pixels(backend, dr.arange(backend.UInt32, lanes.count))
@@ -38,8 +39,8 @@ def trace_lanes(
     values = {"color": found.color, "alpha": found.coverage, "depth": found.depth, "z": found.view_depth}
     if layers:
         values |= compute_layers(device, canvas, pixels, found, layers)
-    places = lanes.places(backend, pixels)
-    picture = {name: _scattered(value, places, pixels, lanes.room) for name, value in values.items()}
+    components = {name: _components(value) for name, value in values.items()}
+    picture = scattered(backend, components, lanes.places(backend, pixels), pixels.active, lanes.room)
     hits = {} if met is None else {count_of("hits"): met}
     return picture | _totals(backend, found.counts) | hits
 
@@ -56,18 +57,9 @@ def count_of(name: str) -> str:
     return f"number of {name}"
 
 
-def _scattered(value: Any, places: Any, pixels: PixelGrid, room: int) -> Any:
-    """Values of lanes (components, n) at these places of a result with room for so many pixels, components
-    last.
-
-    Each pixel is written by the one lane that owns it: no atomics.
-    """
-    components = list(value) if isinstance(value, list) or dr.depth_v(value) > 1 else [value]
-    target = dr.empty(type(components[0]), room * len(components))
-    for k, component in enumerate(components):
-        index = places * len(components) + k
-        dr.scatter(target, component, index, pixels.active, mode=dr.ReduceMode.Permute)
-    return target
+def _components(value: Any) -> list[Any]:
+    """The components (n,) of a list, a vector or a number."""
+    return list(value) if isinstance(value, list) or dr.depth_v(value) > 1 else [value]
 
 
 def _totals(backend: Backend, counts: Counts) -> dict[str, Any]:

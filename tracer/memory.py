@@ -11,8 +11,8 @@ import os
 from dataclasses import dataclass
 
 from tracer.errors import MachineError, UsageError
-from tracer.film.layout import COMPONENTS, VISIBILITY
 from tracer.first_shadows import MOST_LIGHTS
+from tracer.pixel_records import components_of, records_of, width_of
 from tracer.scene import Scene
 from tracer.settings import RAYS_PER_BAND
 from tracer.tiles import FEWEST_PIXELS
@@ -55,9 +55,9 @@ def need_of(
 ) -> Need:
     """What a pass over so many pixels takes; `real`: bytes of a number, 4 or 8. An adaptive picture has a
     film of refined pixels as well."""
-    numbers = 6 + sum(_components(scene, name) for name in layers)
-    film = numbers * real
-    written = numbers * 4 + 12
+    counts = components_of(layers, len(scene.lights))
+    film = sum(width_of(record, counts) for record in records_of(counts, real == 4)) * real
+    written = sum(counts.values()) * 4 + 12
     filtered = FILTER_BYTES if scene.camera.depth_of_field is not None else 0
     refined, listed = (film + NOTED_BYTES, LISTED_BYTES) if adaptive else (0, 0)
     fixed = _process() + KERNELS + pixels * (film + refined + max(written, filtered))
@@ -91,10 +91,6 @@ def rays_that_fit(need: Need, sub_rays: int, limit: int | None, most: int = RAYS
 def in_words(size: int) -> str:
     """`1.5 GiB`, `300 MiB`."""
     return f"{size / 2**30:.1f} GiB" if size >= 2**30 else f"{-(-size // 2**20)} MiB"
-
-
-def _components(scene: Scene, name: str) -> int:
-    return len(scene.lights) if name == VISIBILITY else len(COMPONENTS.get(name, ("",)))
 
 
 def _bundle_bytes(real: int) -> int:

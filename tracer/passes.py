@@ -20,6 +20,7 @@ from tracer.kept_bands import KeptBands, identity_of
 from tracer.launch import COUNTERS, counts_of, trace_lanes
 from tracer.memory import need_of, rays_that_fit
 from tracer.phases import Phases
+from tracer.pixel_records import components_of, taken_apart
 from tracer.pixels import BandLanes, Lanes
 from tracer.scene import Scene
 from tracer.settings import Settings, picture_canvas, picture_rectangle
@@ -59,6 +60,7 @@ class Passes:
         self.phases = Phases()
         self.progress = progress or (lambda done, total, rays: None)
         self._work = work
+        self._components = components_of(self.layers, len(scene.lights))
         self._counted_shapes = len(scene.shapes) if settings.count_hits else 0
         with self.phases.phase("build"):
             self._device = compile_scene(scene, backend)
@@ -116,7 +118,8 @@ class Passes:
         first = first_hits(self._device, self.canvas, canvas, lanes, n)
         found = trace_lanes(self._device, canvas, lanes, first, tuple(self.layers), self._counted_shapes)
         counts = counts_of(found) | {"primary": n * n}
-        return {name: values.numpy() for name, values in found.items()}, counts
+        arrays = {key: values.numpy() for key, values in found.items()}
+        return taken_apart(arrays, self._components, self.backend.precision == "single"), counts
 
     def empty_film(self, rectangle: Rectangle) -> Film:
         """A film of which nothing is traced."""

@@ -22,8 +22,16 @@ COMPONENTS: dict[str, tuple[str, ...]] = {
     "refracted": RGB,
 }
 IDS = frozenset({"shape", "primitive"})
+INTEGERS = dict.fromkeys(IDS, np.int32) | dict.fromkeys(("level", "rays"), np.uint32)
+"""Layers of whole numbers, and their types."""
+
 VISIBILITY = "visibility"
 """Has a component for each light, also where there is only one."""
+
+
+def component_count(name: str, lights: int) -> int:
+    """How many numbers a layer has in each pixel."""
+    return lights if name == VISIBILITY else len(COMPONENTS.get(name, ("",)))
 
 
 def color_channels(color: NDArray, alpha: NDArray) -> dict[str, NDArray]:
