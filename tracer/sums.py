@@ -7,7 +7,7 @@ plain picture.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,7 @@ import drjit as dr
 
 from tracer.arrival import Watch
 from tracer.backends import Backend
+from tracer.branches import changed_where
 from tracer.device_scene import DeviceScene
 from tracer.film.layout import VISIBILITY
 
@@ -50,17 +51,22 @@ class Sums:
         """What is to be known of the direct light, in lanes where it is that of a primary ray."""
         return Watch(any(name in self.parts for name in TERMS), self.seen, lanes)
 
-    def with_light(self, is_primary: Any, own: Mapping[str, Any], whole: Any) -> Sums:
-        """The sums with what a ray brings: of a primary ray by part (`own`), of another the `whole` of it,
-        for the branch in which it stands."""
-        parts = {}
-        for name, total in self.parts.items():
-            if name in BRANCHES:
-                (mirrored,) = self.mirrored
-                lanes = ~is_primary & (mirrored if name == "reflected" else ~mirrored)
-                parts[name] = total + dr.select(lanes, whole, 0)
-            else:
-                parts[name] = total + dr.select(is_primary, own[name], 0)
+    def with_light(self, is_primary: Any, own: Callable[[], Mapping[str, Any]], whole: Any) -> Sums:
+        """The sums with what a ray brings: of a primary ray by part (`own` gives them, and is not asked where
+        a packet has no such ray), of another the `whole` of it, for the branch in which it stands."""
+
+        def with_own(totals: dict[str, Any]) -> dict[str, Any]:
+            found = own()
+            return {name: total + found[name] for name, total in totals.items()}
+
+        parts = dict(self.parts)
+        firsts = {name: total for name, total in parts.items() if name not in BRANCHES}
+        if firsts:
+            parts |= changed_where(is_primary, firsts, with_own, label="own light")
+        for name in [name for name in BRANCHES if name in parts]:
+            (mirrored,) = self.mirrored
+            lanes = ~is_primary & (mirrored if name == "reflected" else ~mirrored)
+            parts[name] = parts[name] + dr.select(lanes, whole, 0)
         return Sums(parts, self.seen, self.mirrored)
 
     def with_next(self, level: Any, refracts: Any) -> Sums:

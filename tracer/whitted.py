@@ -9,6 +9,7 @@ stack is short.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -137,8 +138,8 @@ def trace_pixels(
         color += dr.select(sees_background, path.throughput * scene.background, 0)
         if dr.hint(layers != (), mode="scalar"):
             behind = dr.select(sees_background, path.throughput * scene.background, 0)
-            parts = _own_parts(scene, base, material.absorption, light, found, behind)
-            sums = sums.with_light(is_primary, parts, dr.select(found, local, behind))
+            own_parts = partial(_own_parts, scene, base, material.absorption, light, found, behind)
+            sums = sums.with_light(is_primary, own_parts, dr.select(found, local, behind))
 
         # ---- Its children ----
         children = spawn(scene, path, surface, material, base * scene.not_ambient, found)
