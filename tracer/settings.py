@@ -60,8 +60,8 @@ class Settings:
         return int(self.supersample or own)
 
     def checked(self) -> Settings:
-        """The settings with AOV names and the threshold spelled out; raises `UsageError`."""
-        aovs = (self.aovs,) if isinstance(self.aovs, str) else tuple(self.aovs)
+        """The settings with AOV names, each once, and the threshold spelled out; raises `UsageError`."""
+        aovs = (self.aovs,) if isinstance(self.aovs, str) else tuple(dict.fromkeys(self.aovs))
         known = ["depth", *NAMES]
         if "all" in aovs:
             aovs = tuple(known)

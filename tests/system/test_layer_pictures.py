@@ -39,7 +39,8 @@ def names(folder: Path) -> list[str]:
 
 
 def test_each_layer_is_a_picture_beside_the_first_file(tracer: Run, tmp_path: Path) -> None:
-    options = ("--aov", "shape", "--aov", "visibility", "--crop", "10", "20", "200", "190")
+    # The depth is always there, and may be named.
+    options = ("--aov", "depth", "--aov", "shape", "--aov", "visibility", "--crop", "10", "20", "200", "190")
     done = tracer(*SMALL, *options, "-o", "out.npz")
     assert (done.returncode, done.stderr) == (0, "")
     assert re.match(r"out\.npz, out\.LAYER\.png \(5 layers\)  190x170  ", done.stdout)
