@@ -14,8 +14,9 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import product
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -26,8 +27,11 @@ import numpy as np
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 TICKS = os.sysconf("SC_CLK_TCK")
 AT_REST = "() => window.viewer?.picture?.header?.final"
-WARM_UP = 1 / 3
-"""Share of the random interaction that the memory curve leaves out: caches and kernels come first."""
+REPORT = 10
+"""Milliseconds from one report of the mouse to the next."""
+
+WARM_UP = 1 / 2
+"""Share of the random interaction that the memory curve leaves out: caches fill first."""
 
 
 def processes_below(root: int) -> list[int]:
@@ -91,95 +95,120 @@ def opened(scene: str, resolution: tuple[int, int], cache: Path) -> Iterator[tup
 
 
 def measured(
-    page: Any, tracer: int, browser: int, cache: Path, seconds: float, step: Callable[[int], None]
+    page: Any, tracer: int, browser: int, cache: Path, seconds: float, motion: str
 ) -> dict[str, Any]:
-    """Does something again and again, as quickly as a mouse reports, and looks at what the user gets."""
+    """Lets the page move something, as often as a mouse reports, and looks at what the user gets."""
     page.evaluate("() => { viewer.picture.latencies = []; }")
     shown, kernels = page.evaluate("() => viewer.picture.shown"), len(list(cache.iterdir()))
     used = seconds_of(tracer), seconds_of(browser)
-    began, number = time.perf_counter(), 0
-    rendering: list[float] = []
-    sizes: list[int] = []
+    began = time.perf_counter()
+    page.evaluate(f"() => {{ let number = 0; window.motion = setInterval({motion}, {REPORT}); }}")
+    headers: list[dict[str, Any]] = []
     while time.perf_counter() - began < seconds:
-        step(number)
-        number += 1
-        header = page.evaluate("() => viewer.picture.header")
-        rendering.append(header["seconds"]["render"])
-        sizes.append(header["width"])
-        time.sleep(0.012)
+        time.sleep(0.25)
+        headers.append(page.evaluate("() => viewer.picture.header"))
     elapsed = time.perf_counter() - began
+    frames = page.evaluate("() => viewer.picture.shown") - shown
+    page.evaluate("() => clearInterval(window.motion)")
     return {
-        "frames/s": round((page.evaluate("() => viewer.picture.shown") - shown) / elapsed, 1),
+        "frames/s": round(frames / elapsed, 1),
         "median ms from input to picture": round(median(page.evaluate("() => viewer.picture.latencies"))),
-        "median ms to render": round(1000 * median(rendering)),
-        "median columns": median(sizes),
+        "median ms to render": round(1000 * median(header["seconds"]["render"] for header in headers)),
+        "median ms to compress": round(1000 * median(header["seconds"]["compress"] for header in headers), 1),
+        "median ms to unpack and draw": round(median(page.evaluate("() => viewer.picture.drawing")), 1),
+        "median columns": median(header["width"] for header in headers),
         "tracer's processor seconds a second": round((seconds_of(tracer) - used[0]) / elapsed, 2),
         "browser's": round((seconds_of(browser) - used[1]) / elapsed, 2),
         "kernels compiled": len(list(cache.iterdir())) - kernels,
     }
 
 
-def drag(page: Any) -> Callable[[int], None]:
-    """Orbits, to and fro."""
+DRAG = """() => {
+  const box = viewer.picture.canvas.getBoundingClientRect();
+  number += 1;
+  viewer.picture.canvas.dispatchEvent(new PointerEvent("pointermove", {
+    clientX: box.x + box.width / 2 + 150 * Math.sin(number / 60),
+    clientY: box.y + box.height / 2 + 20 * Math.sin(number / 45),
+  }));
+}"""
+"""Orbits, to and fro, once the button is down."""
+
+SLIDE = """() => {
+  const sliders = document.querySelectorAll("[data-control]");
+  const range = sliders[Math.floor(number / 40) % sliders.length];
+  range.value = Math.abs(number % 40 - 20) * 50;
+  range.dispatchEvent(new Event("input"));
+  number += 1;
+}"""
+"""Moves every slider to its end and back, one after the other."""
+
+
+def grip(page: Any) -> None:
+    """Presses the button over the middle of the picture."""
     box = page.locator("#picture").bounding_box()
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    page.mouse.move(x, y)
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     page.mouse.down()
-    return lambda number: page.mouse.move(x + 120 * np.sin(number / 40), y + 20 * np.sin(number / 25))
 
 
-def slide(page: Any) -> Callable[[int], None]:
-    """Moves every slider from end to end, one after the other."""
-    names = page.evaluate(
-        "() => [...document.querySelectorAll('[data-control]')].map(r => r.dataset.control)"
-    )
-    script = """([name, step]) => {
-      const range = document.querySelector(`[data-control="${CSS.escape(name)}"]`);
-      range.value = step;
-      range.dispatchEvent(new Event('input'));
-    }"""
-    return lambda number: page.evaluate(script, [names[number // 8 % len(names)], number % 8 * 1000 / 7])
+CHANGE = "([kind, values]) => viewer.link.change(kind, values)"
+LAYERS = ("color", "rays", "shape")
+CHOICES = ("cube", "rabbit")
+CUTOFFS = (0.05, 0.03, 0.011)
 
 
-def wander(page: Any, seed: int) -> Callable[[int], None]:
+def visit(page: Any, choices: Sequence[str]) -> None:
+    """Shows everything once that has kernels of its own and that `wander` goes to: they stay in memory."""
+    for answers in product((False, True), repeat=len(choices)):
+        for name, value in zip(choices, answers, strict=True):
+            page.evaluate(CHANGE, ["choose", {"name": name, "value": value}])
+        for layer, cutoff in product(LAYERS, CUTOFFS):
+            page.evaluate(CHANGE, ["show", {"layer": layer}])
+            page.evaluate(CHANGE, ["set", {"name": "cutoff", "value": cutoff}])
+            page.wait_for_timeout(100)
+            page.wait_for_function(AT_REST, timeout=120_000)
+
+
+def wander(page: Any, choices: Sequence[str], seed: int) -> Callable[[], None]:
     """Whatever a user may do, at random."""
     chance = random.Random(seed)
-    move, change = slide(page), "([kind, values]) => viewer.link.change(kind, values)"
-    choices = page.evaluate(
-        "() => [...document.querySelectorAll('.choice input')].map(i => [i.name, i.value])"
-    )
-    layers = page.evaluate("() => [...document.querySelectorAll('#layer option')].map(o => o.value)")
+    controls = page.evaluate("() => viewer.panel.controls")
 
-    def step(number: int) -> None:
+    def step() -> None:
         kind = chance.randrange(100)
         if kind < 40:
             angles = {"left": chance.uniform(-5, 5), "up": chance.uniform(-2, 2)}
-            page.evaluate(change, ["orbit", angles])
+            page.evaluate(CHANGE, ["orbit", angles])
         elif kind < 85:
-            move(chance.randrange(8000))
+            control = chance.choice(controls)
+            value = chance.uniform(control["low"], control["high"])
+            page.evaluate(CHANGE, ["set", {"name": control["name"], "value": value}])
         elif kind < 90:
-            page.evaluate(
-                "(place) => viewer.link.send({kind: 'look', ...place})",
-                {"x": chance.random(), "y": chance.random()},
-            )
+            place = {"kind": "look", "x": chance.random(), "y": chance.random()}
+            page.evaluate("(place) => viewer.link.send(place)", place)
         elif kind < 93:
-            page.evaluate(change, ["show", {"layer": chance.choice(layers)}])
+            page.evaluate(CHANGE, ["show", {"layer": chance.choice(LAYERS)}])
         elif kind < 96 and choices:
-            name, value = chance.choice(choices)
-            page.evaluate(change, ["choose", {"name": name.removeprefix("choice-"), "value": value == "1"}])
-        else:
+            answer = {"name": chance.choice(choices), "value": chance.random() < 0.5}
+            page.evaluate(CHANGE, ["choose", answer])
+        elif kind < 99:
             page.evaluate("() => viewer.link.gesture()")
-            page.evaluate(change, [chance.choice(("undo", "undo", "reset")), {}])
+            page.evaluate(CHANGE, [chance.choice(("undo", "undo", "reset")), {}])
+        else:
+            page.wait_for_timeout(1500)  # the picture is sharpened
 
     return step
 
 
-def leaked(page: Any, tracer: int, seconds: float, step: Callable[[int], None]) -> dict[str, Any]:
+def leaked(page: Any, tracer: int, seconds: float, seed: int) -> dict[str, Any]:
     """The memory of the tracer's process and of the page over random interaction, and where it leads."""
+    choices = [name for name in CHOICES if page.locator(f'input[name="choice-{name}"]').count()]
+    start = megabytes_of(tracer)
+    visit(page, choices)
+    step = wander(page, choices, seed)
     curve: list[tuple[float, float, float]] = []
     began, number = time.perf_counter(), 0
     while (now := time.perf_counter() - began) < seconds:
-        step(number)
+        step()
         number += 1
         if not curve or now - curve[-1][0] > 1:
             heap = page.evaluate("() => performance.memory.usedJSHeapSize") / 2**20
@@ -189,12 +218,13 @@ def leaked(page: Any, tracer: int, seconds: float, step: Callable[[int], None]) 
     slope = np.polyfit(late[:, 0], late[:, 1], 1)[0]
     return {
         "actions": number,
-        "tracer MiB at first": round(curve[0][1]),
+        "tracer MiB at first": round(start),
+        "when everything was shown once": round(curve[0][1]),
         "after the warm-up": round(float(late[0, 1])),
         "at the end": round(float(late[-1, 1])),
         "MiB a minute after the warm-up": round(60 * float(slope), 2),
         "two hours would add MiB": round(7200 * float(slope)),
-        "page's heap MiB, median of the last third": round(float(np.median(late[len(late) // 2 :, 2])), 1),
+        "page's heap MiB, median at the end": round(float(np.median(late[len(late) // 2 :, 2])), 1),
     }
 
 
@@ -212,12 +242,14 @@ def main(scene: str, resolution: tuple[int, int], seconds: float, wandering: flo
     with tempfile.TemporaryDirectory() as folder:
         cache = Path(folder)
         with opened(scene, resolution, cache) as (page, tracer, browser):
-            found["orbit"] = measured(page, tracer, browser, cache, seconds, drag(page))
+            found["kernels of the first picture"] = len(list(cache.iterdir()))
+            grip(page)
+            found["orbit"] = measured(page, tracer, browser, cache, seconds, DRAG)
             page.mouse.up()
             page.wait_for_timeout(3000)
-            found["sliders"] = measured(page, tracer, browser, cache, seconds, slide(page))
+            found["sliders"] = measured(page, tracer, browser, cache, seconds, SLIDE)
             if wandering:
-                found["random interaction"] = leaked(page, tracer, wandering, wander(page, seed))
+                found["random interaction"] = leaked(page, tracer, wandering, seed)
     click.echo(json.dumps(found, indent=2))
 
 

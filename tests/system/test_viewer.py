@@ -287,6 +287,9 @@ def test_a_second_viewer_takes_a_free_port_and_both_end_with_ctrl_c(
     (tmp_path / "ball.toml").write_text(BALL)
     second, third = (start(tmp_path, "ball.toml") for _ in range(2))
     assert len({viewer.url, second.url, third.url}) == 3
+    busy = start(tmp_path, "ball.toml", "--port", viewer.url.split(":")[2].strip("/"))
+    code, said = busy.end()
+    assert code == 2 and "cannot listen there" in said, "a port that was asked for is not exchanged"
     began = time.monotonic()
     assert second.end() == (0, "")
     assert third.end(signal.SIGTERM) == (0, "")

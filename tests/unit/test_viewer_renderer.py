@@ -5,7 +5,7 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import cv2
 import drjit as dr
@@ -192,16 +192,24 @@ def test_a_renderer_at_rest_takes_no_time(watcher: Watcher) -> None:
     assert watcher.renderer.do(time.thread_time).result(timeout=PATIENCE) - before < 0.1
 
 
+def paced(pace: Pace, cost: Callable[[float], float], frames: int = 60) -> list[float]:
+    """The scales of so many frames, of which each costs what its scale costs."""
+    scales = []
+    for _ in range(frames):
+        scales.append(pace.scale)
+        pace.took(pace.scale, cost(pace.scale))
+    return scales
+
+
 def test_the_pace_finds_the_largest_size_that_comes_in_time() -> None:
     pace = Pace(target=0.05)
-    for _ in range(60):
-        pace.took(pace.scale, 0.2 * pace.scale**2)
-    assert pace.scale == 0.5, "0.5 takes exactly the target, 0.65 more"
-    for _ in range(60):
-        pace.took(pace.scale, 0.03 * pace.scale**2)
-    assert pace.scale == 1.0
-    for _ in range(60):
-        pace.took(pace.scale, 10.0)
-    assert pace.scale == LADDER[-1]
-    pace.took(0.123, 1.0)
-    assert pace.scale == LADDER[-1], "a size that is no draft's is no measure"
+    assert paced(pace, lambda scale: 0.2 * scale**2)[-20:] == [0.5] * 20, "which takes exactly the target"
+    assert paced(pace, lambda scale: 0.03 * scale**2)[-20:] == [1.0] * 20
+    assert paced(pace, lambda scale: 100 * scale**2)[-20:] == [LADDER[-1]] * 20
+
+
+def test_the_pace_does_not_blur_where_that_gains_nothing() -> None:
+    """What a frame costs apart from its size is more than the target; now and then a smaller one is tried."""
+    scales = paced(Pace(target=0.05), lambda scale: 0.1 + 0.001 * scale**2, frames=400)
+    assert min(scales) >= LADDER[1]
+    assert sum(scale == 1.0 for scale in scales) > 380

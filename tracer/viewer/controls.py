@@ -61,12 +61,12 @@ class Control:
 
 def controls_of(scene: Scene) -> list[Control]:
     """The controls of a scene, in the order of the panel; ranges reach beyond the values that it has."""
-    return [*_scene(), *_focus(scene), *_lights(scene), *_materials(scene), *_textures(scene)]
+    return [*_scene(scene), *_focus(scene), *_lights(scene), *_materials(scene), *_textures(scene)]
 
 
-def _scene() -> Iterator[Control]:
+def _scene(scene: Scene) -> Iterator[Control]:
     yield Control(("ambient",), "Scene", "", "ambient a", 0.0, 1.0)
-    yield Control(("cutoff",), "Scene", "", "cut-off", 0.01, 1.0, logarithmic=True)
+    yield Control(("cutoff",), "Scene", "", "cut-off", min(0.01, scene.cutoff), 1.0, logarithmic=True)
 
 
 def _focus(scene: Scene) -> Iterator[Control]:
@@ -100,16 +100,19 @@ def _lights(scene: Scene) -> Iterator[Control]:
 
 def _materials(scene: Scene) -> Iterator[Control]:
     for name, material in scene.materials.items():
-        path = ("materials", name)
-        for key, label in zip(SHARES, ("reflection k_r", "refraction k_t", "absorption k_a"), strict=True):
-            yield Control((*path, key), "Materials", name, label, 0.0, 1.0)
-        yield Control((*path, "ior"), "Materials", name, "ior", 0.5, max(3.0, material.ior))
-        yield Control((*path, "diffuse"), "Materials", name, "diffuse m", 0.0, max(2.0, 2 * material.diffuse))
-        yield Control(
-            (*path, "specular"), "Materials", name, "specular h", 0.0, max(2.0, 2 * material.specular)
-        )
-        most = max(500.0, material.shininess)
-        yield Control((*path, "shininess"), "Materials", name, "shininess s", 1.0, most, logarithmic=True)
+        ior, shininess = material.ior, material.shininess
+        ranges = [
+            ("reflection", "reflection k_r", 0.0, 1.0),
+            ("refraction", "refraction k_t", 0.0, 1.0),
+            ("absorption", "absorption k_a", 0.0, 1.0),
+            ("ior", "ior", min(0.5, ior), max(3.0, ior)),
+            ("diffuse", "diffuse m", 0.0, max(2.0, 2 * material.diffuse)),
+            ("specular", "specular h", 0.0, max(2.0, 2 * material.specular)),
+            ("shininess", "shininess s", min(1.0, shininess or 0.1), max(500.0, shininess)),
+        ]
+        for key, label, low, high in ranges:
+            path = ("materials", name, key)
+            yield Control(path, "Materials", name, label, low, high, logarithmic=key == "shininess")
 
 
 def _textures(scene: Scene) -> Iterator[Control]:

@@ -18,6 +18,7 @@ export class Panel {
     this.#link = link;
     this.camera = "";
     this.revision = -1; // of the values on display
+    this.controls = []; // as the tracer describes them
     this.heard = 0; // stamp of the last change that they include
     this.#buttons();
     link.on("panel", (panel) => this.#build(panel));
@@ -69,6 +70,7 @@ export class Panel {
     document.getElementById("compare").hidden = !comparison;
     document.getElementById("layer").replaceChildren(...layers.map(([value, text]) => element("option", { value, textContent: text })));
     this.onresolution(...resolution);
+    this.controls = controls;
     this.#choices(choices);
     this.#controls(controls);
   }
@@ -129,7 +131,7 @@ export class Panel {
       this.#link.gesture();
       this.#soon(control.name, Number(number.value));
     });
-    this.#sliders.set(control.name, { control, range, number });
+    this.#sliders.set(control.name, { control, range, number, value: NaN });
     return element("div", { className: "control" }, element("span", { textContent: control.label }), range, number);
   }
 
@@ -142,12 +144,14 @@ export class Panel {
       });
     }
     this.#pending.set(name, value);
+    this.#sliders.get(name).value = NaN; // whatever comes of it is shown
   }
 
   #show({ values, choices, layer, camera, focus, undo, revision, heard }) {
     for (const [name, value] of Object.entries(values)) {
       const slider = this.#sliders.get(name);
-      if (!slider || value === null) continue;
+      if (!slider || value === null || value === slider.value) continue;
+      slider.value = value;
       const { control, range, number } = slider;
       if (!range.matches(":active") && !this.#pending.has(name)) range.value = toStep(control, value);
       if (document.activeElement !== number) number.value = shown(value);
@@ -159,15 +163,14 @@ export class Panel {
     document.getElementById("layer").value = layer;
     document.getElementById("focus").checked = focus;
     document.getElementById("undo").disabled = undo === 0;
-    document.getElementById("toml").textContent = camera;
-    this.camera = camera;
+    if (camera !== this.camera) document.getElementById("toml").textContent = this.camera = camera;
     this.revision = revision;
     this.heard = heard;
   }
 }
 
 const toStep = ({ low, high, logarithmic }, value) =>
-  STEPS * (logarithmic ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low));
+  STEPS * (logarithmic ? Math.log(Math.max(value, low) / low) / Math.log(high / low) : (value - low) / (high - low));
 
 const fromStep = ({ low, high, logarithmic }, step) => {
   if (step === 0) return low;

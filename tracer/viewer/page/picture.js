@@ -2,6 +2,7 @@
 // from an input to the first picture that shows it.
 
 const WINDOW = 1000; // milliseconds over which frames are counted
+const TARGET = 20; // frames a second for which the tracer chooses the size
 
 export class Picture {
   #canvas = document.getElementById("picture");
@@ -17,6 +18,7 @@ export class Picture {
     this.#link = link;
     this.shown = 0; // frames drawn
     this.latencies = []; // of the last inputs, in milliseconds
+    this.drawing = []; // milliseconds that the last frames took to unpack and draw
     this.header = null; // of the frame on the screen
     link.on("frame", (header, jpeg) => this.#draw(header, jpeg));
     new ResizeObserver(() => this.#fit()).observe(this.#stage);
@@ -44,19 +46,26 @@ export class Picture {
 
   async #draw(header, jpeg) {
     const began = performance.now();
-    const bitmap = await createImageBitmap(new Blob([jpeg], { type: "image/jpeg" }));
-    if (!this.header || header.number > this.header.number) {
-      if (this.#canvas.width !== header.width || this.#canvas.height !== header.height) {
-        this.#canvas.width = header.width;
-        this.#canvas.height = header.height;
-      }
-      this.#context.drawImage(bitmap, 0, 0);
-      this.header = header;
+    try {
+      const bitmap = await createImageBitmap(new Blob([jpeg], { type: "image/jpeg" }));
+      if (!this.header || header.number > this.header.number) this.#put(header, bitmap);
+      bitmap.close();
+    } finally {
+      // In any case: the tracer renders no more while two frames are on their way.
+      const now = performance.now();
+      this.#link.send({ kind: "ack", frame: header.number, seconds: (now - began) / 1000 });
+      this.drawing = [...this.drawing.slice(-499), now - began];
+      this.#count(header, now);
     }
-    bitmap.close();
-    const now = performance.now();
-    this.#link.send({ kind: "ack", frame: header.number, seconds: (now - began) / 1000 });
-    this.#count(header, now);
+  }
+
+  #put(header, bitmap) {
+    if (this.#canvas.width !== header.width || this.#canvas.height !== header.height) {
+      this.#canvas.width = header.width;
+      this.#canvas.height = header.height;
+    }
+    this.#context.drawImage(bitmap, 0, 0);
+    this.header = header;
   }
 
   #count(header, now) {
@@ -68,7 +77,7 @@ export class Picture {
     }
     document.getElementById("wait").hidden = true;
     const show = (id, text) => (document.getElementById(id).textContent = text);
-    show("rate", header.final ? "at rest" : `${this.#times.length} frames/s`);
+    show("rate", header.final ? "at rest" : `${this.#times.length} frames/s, wanted: ${TARGET}`);
     show("size", `${header.width} × ${header.height}`);
     show("quality", header.supersample > 1 ? `${header.supersample} × ${header.supersample} rays a pixel` : "1 ray a pixel");
     const milliseconds = (header.seconds.render * 1000).toFixed(0);
