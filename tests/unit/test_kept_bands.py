@@ -9,6 +9,7 @@ import pytest
 
 import tracer
 from tests.accuracy import worlds
+from tests.unit.mesh_writers import Gltf
 from tracer import kept_bands
 from tracer.errors import UsageError
 from tracer.film.work_file import WorkFile
@@ -74,15 +75,25 @@ def test_the_time_of_earlier_runs_counts(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_files_of_the_scene_count_as_well(tmp_path: Path) -> None:
+    """What a mesh file holds, and the buffer beside a glTF file."""
     triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
     (tmp_path / "a.obj").write_text(triangle)
+    gltf = Gltf()
+    gltf.mesh(gltf.primitive([(0, 0, 1), (1, 0, 1), (0, 1, 1)]))
+    (tmp_path / "b.gltf").write_bytes(gltf.json(uri="its buffer.bin"))
+    (tmp_path / "its buffer.bin").write_bytes(gltf.data)
     table = worlds.FEATURES["disk jitter"]()
-    table["shapes"] = [*table["shapes"], {"kind": "mesh", "file": "a.obj"}]
+    table["shapes"] = [*table["shapes"], *({"kind": "mesh", "file": name} for name in ("a.obj", "b.gltf"))]
     scene = tracer.load(table, base_dir=tmp_path)
     work = WorkFile(tmp_path / "a.work")
     tracer.render(scene, rays_per_band=600, work=work)
     work.close()
-    (tmp_path / "a.obj").write_text(triangle + "# other\n")
-    key = rf"shapes\.{len(table['shapes']) - 1}\.file \(what the file holds\)"
-    with pytest.raises(UsageError, match=f"another `{key}`"):
-        tracer.render(scene, work=WorkFile(tmp_path / "a.work", resume=True))
+    resumed = WorkFile(tmp_path / "a.work", resume=True)
+    tracer.render(scene, work=resumed)
+    resumed.close()
+    for shape, file in enumerate(("a.obj", "its buffer.bin"), len(table["shapes"]) - 2):
+        before = (tmp_path / file).read_bytes()
+        (tmp_path / file).write_bytes(before + b"#")
+        with pytest.raises(UsageError, match=rf"another `shapes\.{shape}\.file \(what the file holds\)`"):
+            tracer.render(scene, work=WorkFile(tmp_path / "a.work", resume=True))
+        (tmp_path / file).write_bytes(before)

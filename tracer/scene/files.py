@@ -10,6 +10,7 @@ from typing import Any
 
 from tracer.assets import ASSETS
 from tracer.messages import Refusal, show
+from tracer.shapes.gltf_file import GLTF_SUFFIXES, GltfFile
 
 ASSETS_PREFIX = (
     "assets"  # a name that starts with it means the assets folder where the scene's folder has none
@@ -27,9 +28,19 @@ def records_with_files(scene: Any) -> Iterator[tuple[Any, tuple[str | int, ...]]
 
 
 def file_digests(scene: Any) -> dict[str, str]:
-    """SHA-256 of what each file of a scene holds, by its name in the scene; each is read once."""
+    """SHA-256 of what each file of a scene holds, by its name in the scene; each is read once. A glTF file
+    holds its buffers, wherever they are."""
     names = dict.fromkeys(record.file for record, _ in records_with_files(scene))
-    return {name: hashlib.sha256(scene.resolve(name).read_bytes()).hexdigest() for name in names}
+    return {name: _digest(scene.resolve(name)) for name in names}
+
+
+def _digest(path: Path) -> str:
+    beside = GltfFile(path).buffer_files() if path.suffix.lower() in GLTF_SUFFIXES else []
+    digest = hashlib.sha256()
+    for file in (path, *beside):
+        if file.is_file():
+            digest.update(file.read_bytes())
+    return digest.hexdigest()
 
 
 def locate(file: str, base_dir: Path, allow_outside: bool, *, also: tuple[Path, ...] = ()) -> Path:

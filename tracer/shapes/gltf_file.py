@@ -17,6 +17,8 @@ import numpy as np
 
 from tracer.messages import show
 
+GLTF_SUFFIXES = (".gltf", ".glb")
+
 _TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _LARGEST = 2**53  # numbers beyond are no numbers of anything in a file
@@ -109,6 +111,16 @@ class GltfFile:
                 raise ValueError(f"{what} has {len(data)} bytes; {length} are announced")
             self._buffers[number] = data[:length]
         return self._buffers[number]
+
+    def buffer_files(self) -> list[Path]:
+        """The files that hold its buffers, whether or not they are needed."""
+        buffers = entries(self.tree, "buffers", "the file")
+        uris = [buffer.get("uri") for buffer in buffers if isinstance(buffer, dict)]
+        return [
+            self._folder / unquote(uri)
+            for uri in uris
+            if isinstance(uri, str) and not uri.startswith("data:")
+        ]
 
     def _fetch(self, uri: Any, what: str) -> bytes:
         """The bytes that a URI names: in itself, or in a file beside this one."""
