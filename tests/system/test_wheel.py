@@ -74,6 +74,7 @@ def test_the_wheel_holds_scenes_and_assets_and_no_leftovers(wheel: Path, reposit
         files = [file for file in (repository / folder).glob("*.*") if file.is_file()]
         assert {f"tracer/data/{folder}/{file.name}" for file in files} <= names
     assert {"tracer/py.typed", "tracer/cli/classic.py", "reference/plain.py"} <= names
+    assert {f"tracer/viewer/page/{name}" for name in ("index.html", "main.js", "viewer.css")} <= names
     assert "reference/report/templates/page.html.j2" in names
     assert "reference/bench/report/templates/bench.html.j2" in names
     assert not [name for name in names if "__pycache__" in name or name.endswith((".pyc", ".partial.png"))]

@@ -1,0 +1,1 @@
+"""How quick the live viewer is at the browser, and what it keeps in memory."""
