@@ -12,7 +12,7 @@ import pytest
 
 import tracer
 from tests.accuracy import worlds
-from tracer import adaptive, contrast, kept_bands
+from tracer import adaptive, contrast, first_hits, kept_bands
 from tracer.backends import find_backend
 from tracer.errors import UsageError
 from tracer.film.counts import counts_in
@@ -52,6 +52,18 @@ def test_nothing_is_left_out_at_threshold_0(precision: str, n: int) -> None:
     assert {
         name for name, layer in arrays_of(result).items() if layer.tobytes() != full[name].tobytes()
     } == set()
+
+
+def test_lists_of_pixels_go_in_bundles_as_well(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """What primary rays meet among triangles, found in bundles of whatever pixels follow each other."""
+    table = worlds.FEATURES["smooth glass"]()
+    scene = tracer.load(table, base_dir=worlds.write_files(tmp_path))
+    settings: dict[str, Any] = {"supersample": "adaptive", "threshold": THRESHOLD, "aovs": "all"}
+    singly = arrays_of(tracer.render(scene, **settings))
+    for threshold in ("FEWEST_RAYS", "SMALLEST_EDGE", "SMALLEST_SHADOW_EDGE", "SMALLEST_SHARE"):
+        monkeypatch.setattr(first_hits, threshold, 0)
+    bundled = arrays_of(tracer.render(scene, **settings))
+    assert {name for name, layer in bundled.items() if layer.tobytes() != singly[name].tobytes()} == set()
 
 
 @pytest.mark.parametrize("n", [2, 3, 4])
