@@ -11,8 +11,8 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from tracer.acceleration.bundles import DOUBTFUL, RAYS, settle_doubtful
-from tracer.acceleration.first_of_bundles import Bundles, nearest_of_neighbors
+from tracer.acceleration.bundles import DOUBTFUL, RAYS, in_order, settle_bundles, settle_doubtful
+from tracer.acceleration.first_of_bundles import Bundles, nearest_of_bundles
 from tracer.acceleration.triangle import TriangleTables
 from tracer.canvas import Canvas, DeviceCanvas
 from tracer.device_scene import DeviceScene
@@ -56,7 +56,15 @@ def first_hits(
     edge, share = _appearance(scene.triangles, canvas)
     if rays < FEWEST_RAYS or edge < SMALLEST_EDGE:
         return FirstHits(dr.opaque(index, DOUBTFUL, rays), [])
-    found = bundled(scene, device_canvas, lanes, rays)["primitive"]
+
+    def in_bundles(numbers: Any, both: bool) -> dict[str, Any]:
+        return bundled(scene, device_canvas, lanes, numbers, both)
+
+    answers = in_bundles(dr.arange(index, rays // RAYS), both=False)
+    found = answers["primitive"]
+    settle_bundles(
+        found, answers["unknown"] == 1, lambda numbers: in_bundles(numbers, both=True)["primitive"]
+    )
     settle_doubtful(found, lambda numbers: singly(scene, device_canvas, lanes, numbers)["primitive"])
     if edge < SMALLEST_SHADOW_EDGE or share < SMALLEST_SHARE:
         return FirstHits(found, [])
@@ -64,17 +72,17 @@ def first_hits(
 
 
 @Program
-def bundled(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, rays: int) -> dict[str, Any]:
-    """What so many rays meet, in bundles; see `nearest_of_neighbors`."""
+def bundled(
+    scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, numbers: Any, both: bool
+) -> dict[str, Any]:
+    """What the rays of bundles with these numbers meet, and 1 for those that it does not tell; see
+    `nearest_of_bundles`. The rays of a bundle are neighbors, RAYS with consecutive numbers."""
     assert scene.triangles is not None
-
-    def bundles_of(bundle: Any) -> Bundles:
-        numbers = [bundle * RAYS + k for k in range(RAYS)]
-        rays = [numbered_rays(scene.backend, canvas, lanes, number)[1:] for number in numbers]
-        return Bundles.of(canvas.eye, rays)
-
-    primitive = nearest_of_neighbors(scene.backend, scene.triangles, rays, bundles_of)
-    return {"primitive": primitive}
+    backend = scene.backend
+    rays = [numbered_rays(backend, canvas, lanes, numbers * RAYS + k)[1:] for k in range(RAYS)]
+    bundles = Bundles.of(canvas.eye, rays)
+    answers, unknown = nearest_of_bundles(backend, scene.triangles, bundles, both)
+    return {"primitive": in_order(backend, answers), "unknown": dr.select(unknown, backend.UInt32(1), 0)}
 
 
 @Program

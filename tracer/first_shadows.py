@@ -6,12 +6,11 @@ shapes hide, and about points that other rays meet.
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import drjit as dr
 
-from tracer.acceleration.bundles import RAYS, in_order, settle_doubtful
+from tracer.acceleration.bundles import RAYS, in_order, settle_bundles, settle_doubtful
 from tracer.acceleration.shadows_of_bundles import HIDDEN, LIT, LitPoints, certain_reach, hidden_points
 from tracer.arrival import segment_to
 from tracer.backends import Backend
@@ -45,16 +44,27 @@ def first_shadows(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, primit
         return []
     points = lit_points(scene, canvas, lanes, primitives)
 
-    def single(numbers: Any, sample: LightSample) -> Any:
-        return singly(scene, canvas, lanes, primitives, sample, numbers)["hidden"]
+    def hidden_from(sample: LightSample, where: list[Any]) -> Any:
+        def in_bundles(numbers: Any, both: bool) -> dict[str, Any]:
+            return bundled(scene, sample.position, where, numbers, both)
 
-    hidden = []
-    for number, light in enumerate(lights):
-        where = [points[name] for name in ("x", "y", "z", "primitive", _reach_of(number))]
-        found = bundled(scene, light.samples[0].position, where)["hidden"]
-        settle_doubtful(found, partial(single, sample=light.samples[0]))
-        hidden.append(found)
-    return hidden
+        def single(numbers: Any) -> Any:
+            return singly(scene, canvas, lanes, primitives, sample, numbers)["hidden"]
+
+        answers = in_bundles(dr.arange(scene.backend.UInt32, len(primitives) // RAYS), both=False)
+        found = answers["hidden"]
+        settle_bundles(
+            found, answers["unknown"] == 1, lambda numbers: in_bundles(numbers, both=True)["hidden"]
+        )
+        settle_doubtful(found, single)
+        return found
+
+    return [
+        hidden_from(
+            light.samples[0], [points[name] for name in ("x", "y", "z", "primitive", _reach_of(number))]
+        )
+        for number, light in enumerate(lights)
+    ]
 
 
 @Program
@@ -77,22 +87,22 @@ def lit_points(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, primitive
 
 
 @Program
-def bundled(scene: DeviceScene, light: Any, where: list[Any]) -> dict[str, Any]:
-    """Whether triangles hide a light (3, 1) from points, in bundles of neighbors; see `hidden_points`."""
+def bundled(scene: DeviceScene, light: Any, where: list[Any], numbers: Any, both: bool) -> dict[str, Any]:
+    """Whether triangles hide a light (3, 1) from the points of bundles with these numbers, and 1 for those
+    that it does not tell; see `hidden_points`."""
     assert scene.triangles is not None
     backend = scene.backend
-    bundle = dr.arange(backend.UInt32, len(where[0]) // RAYS)
     *place, primitives, reach = where
 
     def points() -> list[Any]:
-        x, y, z = (_neighbors(backend, values, bundle) for values in place)
+        x, y, z = (_neighbors(backend, values, numbers) for values in place)
         return [backend.Vector3(*p) for p in zip(x, y, z, strict=True)]
 
     bundles = LitPoints(
-        _neighbors(backend, reach, bundle), points, lambda: _neighbors(backend, primitives, bundle)
+        _neighbors(backend, reach, numbers), points, lambda: _neighbors(backend, primitives, numbers)
     )
-    answers = hidden_points(backend, scene.triangles, light, bundles)
-    return {"hidden": in_order(backend, answers, bundle)}
+    answers, unknown = hidden_points(backend, scene.triangles, light, bundles, both)
+    return {"hidden": in_order(backend, answers), "unknown": dr.select(unknown, backend.UInt32(1), 0)}
 
 
 @Program

@@ -39,37 +39,55 @@ BEHIND = 1 + 2.0**-10
 """How much farther than a hit a box may be and still matter, as a factor of the distance."""
 
 
-def in_order(backend: Backend, answers: list[Any], bundle: Any) -> Any:
-    """The answers (n,) to each of the RAYS rays of bundles, whose numbers follow each other, as one array
-    (RAYS n,)."""
-    result = dr.empty(type(answers[0]), dr.width(bundle) * RAYS)
+TINY = 2.0**-20
+"""Where directions of a bundle have both signs on an axis, they are taken to reach at least so far to either
+side; a wider bundle is a careful one."""
+
+
+def in_order(backend: Backend, answers: list[Any]) -> Any:
+    """The answers (n,) to each of the RAYS rays of bundles, one after the other (RAYS n,)."""
+    n = dr.width(answers[0])
+    result = dr.empty(type(answers[0]), n * RAYS)
     for k, answer in enumerate(answers):
         # In any other mode each starts a kernel of its own, with all of the walk.
-        dr.scatter(result, answer, bundle * RAYS + k, mode=dr.ReduceMode.Permute)
+        place = dr.arange(backend.UInt32, n) * RAYS + k
+        dr.scatter(result, answer, place, mode=dr.ReduceMode.Permute)
     return result
+
+
+def settle_bundles(answers: Any, asked: Any, again: Callable[[Any], Any]) -> None:
+    """Replaces the answers (RAYS n,) of the bundles that are `asked` (n,) again: `again(numbers)` gives those
+    of bundles by number."""
+    numbers = _numbers_where(asked)
+    if len(numbers) > 0:
+        index = type(numbers)
+        ray = dr.arange(index, len(numbers) * RAYS)
+        place = dr.gather(index, numbers, ray // RAYS) * RAYS + ray % RAYS
+        dr.scatter(answers, again(numbers), place)
+        dr.eval(answers)
 
 
 def settle_doubtful(answers: Any, singly: Callable[[Any], Any]) -> None:
     """Replaces what is `DOUBTFUL` among the answers (n,) to rays; `singly(numbers)`: those to single rays by
     number."""
-    numbers = _doubtful(answers)
+    numbers = _numbers_where(answers == DOUBTFUL)
     if len(numbers) > 0:
-        dr.eval(numbers)
         dr.scatter(answers, singly(numbers), numbers)
         dr.eval(answers)
 
 
-def _doubtful(answers: Any) -> Any:
-    """Numbers of the doubtful rays, the last one repeated up to a length that few others differ from, since
-    each length is recorded for itself; empty when there are none."""
-    index = type(answers)
-    numbers: Any = dr.compress(answers == DOUBTFUL)
-    n = len(numbers)
+def _numbers_where(mask: Any) -> Any:
+    """Numbers of the lanes of a mask, evaluated, the last one repeated up to a length that few others differ
+    from, since each length is recorded for itself; empty when there are none."""
+    numbers: Any = dr.compress(mask)
+    n, index = len(numbers), type(numbers)
     if n == 0:
         return numbers
     step = max(RAYS, 1 << max(0, n.bit_length() - 3))
     slot = dr.arange(index, -(-n // step) * step)
-    return dr.gather(index, numbers, dr.minimum(slot, dr.opaque(index, n - 1)))
+    padded = dr.gather(index, numbers, dr.minimum(slot, dr.opaque(index, n - 1)))
+    dr.eval(padded)
+    return padded
 
 
 @dataclass
@@ -126,8 +144,12 @@ class Passage:
 @dataclass
 class Cones:
     """Bundles prepared for box tests: between which reciprocals of directions theirs lie, on each axis, as
-    rates and shifts that take a plane to a distance from the eye. `mixed`: on some axis their directions have
-    both signs; nothing is known of such bundles. `start`: distance before which nothing counts."""
+    rates and shifts that take a plane to a distance from the point. `start`: distance before which nothing
+    counts; `mixed` (3 masks): directions have both signs on an axis.
+
+    Most bundles are not mixed, and their test is cheaper: the others are told from it (`unknown`), and go
+    through a kernel for `both` by themselves.
+    """
 
     octant: Any
     mixed: Any
@@ -135,31 +157,50 @@ class Cones:
     first: tuple[Any, Any]
     last: tuple[Any, Any]
     start: Any
+    both: bool
 
     @staticmethod
     def of(
-        backend: Backend, lists: NodeLists, point: Any, directions: list[Any], start: Any, rounding: Any
+        backend: Backend,
+        lists: NodeLists,
+        point: Any,
+        directions: list[Any],
+        start: Any,
+        rounding: Any,
+        both: bool,
     ) -> Cones:
         """Of rays in unit `directions` (RAYS of (3, n)); the rest as for `SeenTriangle`."""
         vector = backend.Vector3
         low = vector(*(smallest(d[k] for d in directions) for k in range(3)))
         high = vector(*(largest(d[k] for d in directions) for k in range(3)))
-        mixed = backend.Bool(False)
-        for k in range(3):
-            mixed = mixed | ~((low[k] > 0) | (high[k] < 0))
+        mixed = ~((low > 0) | (high < 0))
+        if both:
+            low, high = (
+                dr.select(mixed, wider, x)
+                for x, wider in ((low, dr.minimum(low, -TINY)), (high, dr.maximum(high, TINY)))
+            )
         inverses = (dr.rcp(low), dr.rcp(high))
         widest = vector(*(select_max(dr.abs(a), dr.abs(b)) for a, b in zip(*inverses, strict=True)))
         width = rounding * widest
         step, origin = (1, 0) if lists.grid is None else (lists.grid.step, lists.grid.low)
         shifts = tuple((origin - point) * inverse for inverse in inverses)
+        last = tuple(shift + width for shift in shifts)
+        if both:  # where the lowest direction enters through the plane that the highest crosses last
+            last = dr.select(mixed, shifts[0] - width, last[0]), last[1]
         return Cones(
             octant=octant_of(backend, high),
             mixed=mixed,
             rates=tuple(step * inverse for inverse in inverses),
             first=tuple(shift - width for shift in shifts),
-            last=tuple(shift + width for shift in shifts),
+            last=last,
             start=start,
+            both=both,
         )
+
+    @property
+    def unknown(self) -> Any:
+        """Mask: nothing is known of a bundle."""
+        return type(self.mixed.x)(False) if self.both else self.mixed.x | self.mixed.y | self.mixed.z
 
     def crossed(self, node: Node, least: Any) -> Any:
         """Mask: some ray may meet the box, at a reciprocal distance above `least`."""
@@ -167,6 +208,10 @@ class Cones:
         for k in range(3):
             near = [dr.fma(node.first[k], r[k], s[k]) for r, s in zip(self.rates, self.first, strict=True)]
             far = [dr.fma(node.last[k], r[k], s[k]) for r, s in zip(self.rates, self.last, strict=True)]
-            entry = select_max(entry, select_min(*near))
-            leave = select_min(leave, select_max(*far))
+            enters, leaves = select_min(*near), select_max(*far)
+            if self.both:
+                # Away from a box on either side nobody meets it; nobody leaves the slab for good.
+                enters = dr.select(self.mixed[k], select_max(near[1], far[0]), enters)
+                leaves = dr.select(self.mixed[k], dr.inf, leaves)
+            entry, leave = select_max(entry, enters), select_min(leave, leaves)
         return (entry <= leave) & (entry * least <= BEHIND)

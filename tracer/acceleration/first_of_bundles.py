@@ -3,13 +3,12 @@ with the largest reciprocal distance."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 
-from tracer.acceleration.bundles import DOUBTFUL, RAYS, Cones, SeenTriangle, in_order
+from tracer.acceleration.bundles import DOUBTFUL, RAYS, Cones, SeenTriangle
 from tracer.acceleration.triangle import TriangleTables, fetch_triangle
 from tracer.acceleration.walk import walk
 from tracer.backends import INVALID, Backend
@@ -42,24 +41,15 @@ class Bundles:
         return Bundles(eye, [d for _, d in rays], [dr.sqrt(dr.squared_norm(o - eye)) for o, _ in rays])
 
 
-def nearest_of_neighbors(
-    backend: Backend, tables: TriangleTables, count: int, bundles_of: Callable[[Any], Bundles]
-) -> Any:
-    """For each of `count` rays the primitive (count,) that it meets first, `INVALID` for none, `DOUBTFUL`
-    where that is not certain.
-
-    `bundles_of(numbers)`: bundles by number; RAYS rays with consecutive numbers are one.
-    """
-    bundle = dr.arange(backend.UInt32, count // RAYS)
-    return in_order(backend, nearest_of_bundles(backend, tables, bundles_of(bundle)), bundle)
-
-
-def nearest_of_bundles(backend: Backend, tables: TriangleTables, bundles: Bundles) -> list[Any]:
+def nearest_of_bundles(
+    backend: Backend, tables: TriangleTables, bundles: Bundles, both: bool
+) -> tuple[list[Any], Any]:
     """For each of the RAYS rays of bundles the primitive (n,) that it meets first: `INVALID` for none,
-    `DOUBTFUL` where that is not certain."""
+    `DOUBTFUL` where that is not certain. Then mask (n,) of the bundles of which nothing is known, unless for
+    `both` signs (see `Cones`)."""
     rounding = backend.Float(ROUNDING * backend.epsilon * (max_abs(bundles.eye) + tables.lists.extent))
     cones = Cones.of(
-        backend, tables.lists, bundles.eye, bundles.directions, smallest(bundles.starts), rounding
+        backend, tables.lists, bundles.eye, bundles.directions, smallest(bundles.starts), rounding, both
     )
     latest = [dr.rcp(start) for start in bundles.starts]
 
@@ -72,19 +62,20 @@ def nearest_of_bundles(backend: Backend, tables: TriangleTables, bundles: Bundle
         ]
         return state[0] + 1, _farthest(rays), rays
 
-    none = dr.zeros(backend.Float, dr.width(cones.mixed))
-    nothing = _Nearest(none, none, dr.select(cones.mixed, backend.UInt32(DOUBTFUL), INVALID))
+    unknown = cones.unknown
+    none = dr.zeros(backend.Float, dr.width(cones.octant))
+    nothing = _Nearest(none, none, dr.select(unknown, backend.UInt32(DOUBTFUL), INVALID))
     tested, _, rays = walk(
         backend,
         tables.lists,
         cones.octant,
-        crosses=lambda node, state: ~cones.mixed & cones.crossed(node, state[1]),
+        crosses=lambda node, state: ~unknown & cones.crossed(node, state[1]),
         test=test,
         state=(backend.UInt32(none), none, [nothing for _ in range(RAYS)]),
         done=lambda state: state[0] > MOST_TRIANGLES,
         stride=STRIDE,
     )
-    return [dr.select(tested > MOST_TRIANGLES, DOUBTFUL, ray.primitive) for ray in rays]
+    return [dr.select(tested > MOST_TRIANGLES, DOUBTFUL, ray.primitive) for ray in rays], unknown
 
 
 @dataclass

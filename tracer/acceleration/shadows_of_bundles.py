@@ -59,22 +59,26 @@ def certain_reach(backend: Backend, tables: TriangleTables, p: Any, normal: Any,
     return select_max(distance - near, dr.smallest(backend.Float))
 
 
-def hidden_points(backend: Backend, tables: TriangleTables, light: Any, bundles: LitPoints) -> list[Any]:
+def hidden_points(
+    backend: Backend, tables: TriangleTables, light: Any, bundles: LitPoints, both: bool
+) -> tuple[list[Any], Any]:
     """For each of the RAYS points of bundles (n,): whether triangles leave it `LIT` by a light (3, 1), it is
-    `HIDDEN`, or that is `DOUBTFUL`."""
+    `HIDDEN`, or that is `DOUBTFUL`. Then mask (n,) of the bundles of which nothing is known, unless for
+    `both` signs (see `Cones`)."""
     asked = [reach > 0 for reach in bundles.reach]
     all_asked = _bits(backend, asked)
     none = dr.zeros(backend.UInt32, dr.width(all_asked))
 
-    def walked(found: tuple[Any, Any]) -> tuple[Any, Any]:
-        return _walked(backend, tables, light, bundles, asked, all_asked, found)
+    def walked(found: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
+        return _walked(backend, tables, light, bundles, asked, all_asked, both, found)
 
-    hidden, possible = changed_where(all_asked != 0, (none, none), walked, label="asked")
+    nothing = none, none, dr.full(backend.Bool, False, dr.width(none))
+    hidden, possible, unknown = changed_where(all_asked != 0, nothing, walked, label="asked")
     answers = []
     for k in range(RAYS):
         doubtful = dr.select((possible >> k) & 1 != 0, backend.UInt32(DOUBTFUL), LIT)
         answers.append(dr.select((hidden >> k) & 1 != 0, HIDDEN, doubtful))
-    return answers
+    return answers, unknown
 
 
 def _walked(
@@ -84,9 +88,11 @@ def _walked(
     bundles: LitPoints,
     asked: list[Any],
     all_asked: Any,
-    nothing: tuple[Any, Any],
-) -> tuple[Any, Any]:
-    """Of those who ask, a bit for each that certainly is hidden, and for each that may be."""
+    both: bool,
+    nothing: tuple[Any, Any, Any],
+) -> tuple[Any, Any, Any]:
+    """Of those who ask, a bit for each that certainly is hidden, and for each that may be; and mask of the
+    bundles of which nothing is known."""
     points = bundles.points()
     primitives = bundles.primitives()
     ways = [p - light for p in points]
@@ -94,7 +100,8 @@ def _walked(
     directions = _of_those_who_ask([way * i for way, i in zip(ways, inverse, strict=True)], asked)
     ends = [dr.select(asks, max_abs(p), 0) for asks, p in zip(asked, points, strict=True)]
     rounding = (ROUNDING * backend.epsilon) * (max_abs(light) + tables.lists.extent + largest(ends))
-    cones = Cones.of(backend, tables.lists, light, directions, backend.Float(0), rounding)
+    cones = Cones.of(backend, tables.lists, light, directions, backend.Float(0), rounding, both)
+    unknown = cones.unknown
     farthest = smallest(dr.select(asks, i, dr.inf) for asks, i in zip(asked, inverse, strict=True))
     latest = [dr.rcp(reach) for reach in bundles.reach]
 
@@ -113,14 +120,14 @@ def _walked(
         backend,
         tables.lists,
         cones.octant,
-        crosses=lambda node, _: ~cones.mixed & cones.crossed(node, farthest),
+        crosses=lambda node, _: ~unknown & cones.crossed(node, farthest),
         test=test,
-        state=(dr.zeros(backend.UInt32, dr.width(all_asked)), *nothing),
+        state=(dr.zeros(backend.UInt32, dr.width(all_asked)), *nothing[:2]),
         done=lambda state: (state[0] > MOST_TRIANGLES) | ((all_asked & ~state[1]) == 0),
         stride=STRIDE,
     )
-    unknown = cones.mixed | (tested > MOST_TRIANGLES)
-    return hidden & all_asked, dr.select(unknown, all_asked, possible & all_asked)
+    doubtful = unknown | (tested > MOST_TRIANGLES)
+    return hidden & all_asked, dr.select(doubtful, all_asked, possible & all_asked), unknown | nothing[2]
 
 
 def _of_those_who_ask(directions: list[Any], asked: list[Any]) -> list[Any]:
