@@ -37,6 +37,11 @@ def grip(page: Any) -> None:
 
 
 CHANGE = "([kind, values]) => viewer.link.change(kind, values)"
+SET = """([which, share]) => {
+  const { controls } = viewer.panel; // other choices have other ones
+  const { name, low, high } = controls[Math.floor(which * controls.length)];
+  viewer.link.change("set", { name, value: low + share * (high - low) });
+}"""
 LAYERS = ("color", "rays", "shape")
 CHOICES = ("cube", "rabbit")
 CUTOFFS = (0.05, 0.03, 0.011)
@@ -57,7 +62,6 @@ def visit(page: Any, choices: Sequence[str]) -> None:
 def wander(page: Any, choices: Sequence[str], seed: int) -> Callable[[], None]:
     """Whatever a user may do, at random."""
     chance = random.Random(seed)
-    controls = page.evaluate("() => viewer.panel.controls")
 
     def step() -> None:
         kind = chance.randrange(100)
@@ -65,9 +69,7 @@ def wander(page: Any, choices: Sequence[str], seed: int) -> Callable[[], None]:
             angles = {"left": chance.uniform(-5, 5), "up": chance.uniform(-2, 2)}
             page.evaluate(CHANGE, ["orbit", angles])
         elif kind < 85:
-            control = chance.choice(controls)
-            value = chance.uniform(control["low"], control["high"])
-            page.evaluate(CHANGE, ["set", {"name": control["name"], "value": value}])
+            page.evaluate(SET, [chance.random(), chance.random()])
         elif kind < 90:
             place = {"kind": "look", "x": chance.random(), "y": chance.random()}
             page.evaluate("(place) => viewer.link.send(place)", place)

@@ -17,6 +17,8 @@ import cv2
 import numpy as np
 import pytest
 
+from tracer.scene.toml_files import parse_toml
+
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
@@ -176,6 +178,16 @@ def test_wheel_keys_and_the_documents_moves_change_the_picture(page: Page) -> No
     assert all(difference(a, b) > 1 for a, b in zip(pictures, pictures[1:], strict=False))
     page.get_by_role("button", name="Reset").click()
     assert difference(pictures[0], at_rest(page)) == 0
+
+
+def test_the_camera_is_copied_as_the_table_of_a_scene_file(page: Page) -> None:
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    page.get_by_role("button", name="x_rotate +").click()
+    at_rest(page)
+    page.get_by_role("button", name="Copy as TOML").click()
+    page.get_by_text("copied").wait_for()
+    text = page.evaluate("() => navigator.clipboard.readText()")
+    assert parse_toml(text, "clipboard")["camera"]["rotate"] == [5.0, -12.0]
 
 
 def test_each_of_the_six_choices_changes_the_picture(page: Page) -> None:

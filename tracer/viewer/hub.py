@@ -154,9 +154,8 @@ class Hub:
             case messages.Show():
                 known = dict(layers.names_of(session.view.scene))
                 if message.layer not in known:
-                    raise UsageError(
-                        f"layer: {message.layer!r} is unknown; {suggestion(message.layer, known)}"
-                    )
+                    hint = suggestion(message.layer, known, "layer")
+                    raise UsageError(f"there is no layer {message.layer[:80]!r}; {hint}")
                 session.show(message.layer, stamp)
             case messages.Reset():
                 session.reset_camera(stamp)
@@ -181,9 +180,7 @@ class Hub:
                     return {"kind": "saved", "file": file.name}
             return {"kind": "compared", **comparison.compared(scene, self._backend)}
 
-        self.renderer.do(task).add_done_callback(
-            lambda future: self._from_thread(lambda done: self._finish(page, done))(future)
-        )
+        self.renderer.do(task).add_done_callback(self._from_thread(lambda done: self._finish(page, done)))
 
     def _finish(self, page: Page, future: Any) -> None:
         error = future.exception()

@@ -9,6 +9,8 @@ const element = (tag, properties = {}, ...children) => {
   return made;
 };
 
+const tell = (text) => (document.getElementById("notice").textContent = text);
+
 export class Panel {
   #link;
   #sliders = new Map();
@@ -42,14 +44,12 @@ export class Panel {
     });
     on("[data-save]", (button) => {
       const what = button.dataset.save;
+      tell("saving …");
       link.send(what === "scene" ? { kind: "save_scene" } : { kind: "save_still", suffix: what });
     });
     on("#reset", () => this.#step("reset"));
     on("#undo", () => this.#step("undo"));
-    on("#copy", async () => {
-      await navigator.clipboard.writeText(this.camera);
-      document.getElementById("notice").textContent = "copied";
-    });
+    on("#copy", () => this.#copy());
     document.getElementById("focus").addEventListener("change", ({ target }) => this.#step("focus", { value: target.checked }));
     document.getElementById("layer").addEventListener("change", ({ target }) => this.#step("show", { layer: target.value }));
     document.addEventListener("keydown", (event) => {
@@ -57,6 +57,17 @@ export class Panel {
       if (event.key === "z") this.#step("undo");
       if (event.key === "r" && !event.ctrlKey && !event.metaKey) this.#step("reset");
     });
+  }
+
+  async #copy() {
+    if (navigator.clipboard) {
+      await navigator.clipboard.writeText(this.camera);
+      tell("copied");
+    } else {
+      // Browsers keep the clipboard from pages of other machines that come without encryption.
+      getSelection().selectAllChildren(document.getElementById("toml"));
+      tell("the text is selected; copy it with Ctrl-C");
+    }
   }
 
   #step(kind, values = {}) {
