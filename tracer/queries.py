@@ -22,6 +22,10 @@ from tracer.ray import Hit, Ray, normalize
 from tracer.scene import Scene
 from tracer.spawn import material_at, refract_direction
 
+UNIT_SLACK = 6
+"""How far from 1 the square of a unit vector's length may be, in eps: its components round (2), and so does
+the sum of their squares (4)."""
+
 END_GUARD = {"single": 1e-5, "double": 1e-9}
 """`visible`: hits nearer to either end than this times S do not count."""
 
@@ -270,5 +274,12 @@ def _upload(backend: Backend, values: np.ndarray) -> Any:
 
 
 def _upload_directions(backend: Backend, directions: np.ndarray) -> Any:
-    """Unit directions; scaled first, so that no square vanishes or overflows."""
-    return normalize(_upload(backend, directions / np.abs(directions).max(axis=1, keepdims=True)))
+    """Unit directions; scaled first, so that no square vanishes or overflows.
+
+    Those that have unit length within rounding stay as they are: normalized once more, a ray could pass on
+    the other side of the edge or corner that it is aimed at.
+    """
+    given = _upload(backend, directions)
+    is_unit = dr.abs(dr.squared_norm(given) - 1) <= UNIT_SLACK * backend.epsilon
+    scaled = _upload(backend, directions / np.abs(directions).max(axis=1, keepdims=True))
+    return dr.select(is_unit, given, normalize(scaled))

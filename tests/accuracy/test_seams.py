@@ -11,11 +11,13 @@ import drjit as dr
 import numpy as np
 import pytest
 
+import tracer
 from reference.bench.scenes import Workshop, mesh_alone
 from reference.comparison import Case, Outcome
 from reference.comparison.aims import SHARES, aimed
 from reference.comparison.seams import compare_seams
 from reference.exact import edge_functions, passes_through
+from reference.random_scenes import random_scene
 from tracer.acceleration import traverse
 
 pytest.importorskip("mitsuba")
@@ -138,3 +140,13 @@ def test_a_planted_error_is_caught(
     assert not found.passed and found.guilty == "ours", str(found)
     assert found.figures[f"{fault}, ours"] > 10
     assert found.worst is not None and "meets the surface" in str(found)
+
+
+def test_a_ray_at_a_corner_is_traced_as_it_is_given() -> None:
+    """Its direction has unit length within rounding; normalized once more, it passes a tetrahedron by."""
+    ray = (
+        [0.618035078048706, -0.014169340953230858, 0.20642338693141937],
+        [-0.9501326084136963, 0.13199056684970856, -0.2825358808040619],
+    )
+    hits = tracer.intersect(random_scene(8), *(np.array([v]) for v in ray), precision="single")
+    assert hits.shape.tolist() == [3] and abs(hits.t[0] - 0.2374826) < 1e-6
