@@ -50,7 +50,13 @@ toc_object_entries_show_parents = "hide"
 nitpicky = True
 # What autodoc says of aliases and bases; the inventories of other projects would have to be fetched.
 nitpick_ignore = [
-    ("py:class", name) for name in ("collections.abc.Callable", "numpy.ndarray", "pydantic.main.BaseModel")
+    ("py:class", name)
+    for name in (
+        "collections.abc.Callable",
+        "collections.abc.Sequence",
+        "numpy.ndarray",
+        "pydantic.main.BaseModel",
+    )
 ]
 # ---- Looks ----
 html_theme = "furo"

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import tracer
+from tracer.errors import SceneError
 from tracer.lights import PointLight
 from tracer.viewer import renderer as renderer_module
 from tracer.viewer.drafts import compile_copies, compile_filters, draft_of
@@ -113,6 +114,26 @@ def test_a_picture_that_nobody_waits_for_is_given_up(
     frames = watcher.until_rest()
     assert changed.is_set() and watcher.renderer.dropped == 1
     assert not [frame for frame in frames[:-1] if frame.final]
+
+
+def test_a_picture_that_fails_is_told_and_the_next_one_comes(
+    watcher: Watcher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, failures = renderer_module.render, [SceneError("the file is gone"), ValueError("a bug")]
+
+    def render(*arguments: object, **settings: object) -> object:
+        if failures:
+            raise failures.pop(0)
+        return real(*arguments, **settings)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(renderer_module, "render", render)
+    watcher.look()
+    while failures:
+        time.sleep(0.01)
+    watcher.session.rotate(5.0, 0.0)
+    assert watcher.until_rest()[-1].final
+    told, watcher.complaints[:] = list(watcher.complaints), []
+    assert told == ["the file is gone", "unexpected ValueError: a bug"]
 
 
 def test_an_error_of_a_task_goes_to_who_asked(watcher: Watcher) -> None:

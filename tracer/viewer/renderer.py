@@ -160,7 +160,7 @@ class Renderer:
             self._fail(str(error))
             return True
         except Exception as error:  # the thread must outlive it: the next view may do
-            logger.exception("a picture failed")
+            logger.error("a picture failed: unexpected %s: %s", type(error).__name__, error)
             self._fail(f"unexpected {type(error).__name__}: {error}")
             return True
         rendered = time.perf_counter()
