@@ -101,10 +101,7 @@ class Passes:
             try:
                 report(film.finished, 0)
                 for band in (band for rest in remaining for band in cut(rest)):
-                    layers, counts = trace(band)
-                    counts["primary"] *= band.width * band.height
-                    film.take(band, layers)
-                    film.counts = together(film.counts, counts)
+                    _take(film, band, *trace(band))
                     self.phases.count_kernels()
                     kept.finished(band)
                     report(film.finished, number_of_rays(film.counts) - earlier)
@@ -139,6 +136,13 @@ class Passes:
     def _identity(self) -> dict[str, Any]:
         """What a work file must agree in."""
         return identity_of(self.scene, self.settings, self.canvas, self.rectangle, self.backend, self.layers)
+
+
+def _take(film: Film, band: Band, layers: dict[str, np.ndarray], counts: dict[str, Any]) -> None:
+    """Adds a finished band, whose layers must not outlive that: the next band needs the memory."""
+    film.take(band, layers)
+    pixels = band.width * band.height
+    film.counts = together(film.counts, counts | {"primary": counts["primary"] * pixels})
 
 
 def layers_of(scene: Scene) -> list[str]:
