@@ -11,7 +11,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from tracer.acceleration.bundles import DOUBTFUL, RAYS, in_order, settle_bundles, settle_doubtful
+from tracer.acceleration.bundles import DOUBTFUL, RAYS, answers_to, in_order
 from tracer.acceleration.first_of_bundles import Bundles, nearest_of_bundles
 from tracer.acceleration.triangle import TriangleTables
 from tracer.canvas import Canvas, DeviceCanvas
@@ -57,15 +57,14 @@ def first_hits(
     if rays < FEWEST_RAYS or edge < SMALLEST_EDGE:
         return FirstHits(dr.opaque(index, DOUBTFUL, rays), [])
 
-    def in_bundles(numbers: Any, both: bool) -> dict[str, Any]:
-        return bundled(scene, device_canvas, lanes, numbers, both)
+    def in_bundles(numbers: Any, both: bool) -> tuple[Any, Any]:
+        found = bundled(scene, device_canvas, lanes, numbers, both)
+        return found["primitive"], found["unknown"] == 1
 
-    answers = in_bundles(dr.arange(index, rays // RAYS), both=False)
-    found = answers["primitive"]
-    settle_bundles(
-        found, answers["unknown"] == 1, lambda numbers: in_bundles(numbers, both=True)["primitive"]
-    )
-    settle_doubtful(found, lambda numbers: singly(scene, device_canvas, lanes, numbers)["primitive"])
+    def single(numbers: Any) -> Any:
+        return singly(scene, device_canvas, lanes, numbers)["primitive"]
+
+    found = answers_to(index, rays, in_bundles, single)
     if edge < SMALLEST_SHADOW_EDGE or share < SMALLEST_SHARE:
         return FirstHits(found, [])
     return FirstHits(found, first_shadows(scene, device_canvas, lanes, found))

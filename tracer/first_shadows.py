@@ -10,7 +10,7 @@ from typing import Any
 
 import drjit as dr
 
-from tracer.acceleration.bundles import RAYS, in_order, settle_bundles, settle_doubtful
+from tracer.acceleration.bundles import RAYS, answers_to, in_order
 from tracer.acceleration.shadows_of_bundles import HIDDEN, LIT, LitPoints, certain_reach, hidden_points
 from tracer.arrival import segment_to
 from tracer.backends import Backend
@@ -45,19 +45,14 @@ def first_shadows(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, primit
     points = lit_points(scene, canvas, lanes, primitives)
 
     def hidden_from(sample: LightSample, where: list[Any]) -> Any:
-        def in_bundles(numbers: Any, both: bool) -> dict[str, Any]:
-            return bundled(scene, sample.position, where, numbers, both)
+        def in_bundles(numbers: Any, both: bool) -> tuple[Any, Any]:
+            found = bundled(scene, sample.position, where, numbers, both)
+            return found["hidden"], found["unknown"] == 1
 
         def single(numbers: Any) -> Any:
             return singly(scene, canvas, lanes, primitives, sample, numbers)["hidden"]
 
-        answers = in_bundles(dr.arange(scene.backend.UInt32, len(primitives) // RAYS), both=False)
-        found = answers["hidden"]
-        settle_bundles(
-            found, answers["unknown"] == 1, lambda numbers: in_bundles(numbers, both=True)["hidden"]
-        )
-        settle_doubtful(found, single)
-        return found
+        return answers_to(scene.backend.UInt32, len(primitives), in_bundles, single)
 
     return [
         hidden_from(

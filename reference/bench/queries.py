@@ -26,9 +26,6 @@ from tracer.ray import Ray, no_hit
 Query = Callable[[], Any]
 """Traces all rays of one kind once; the mask of those that hit something."""
 
-InBundles = Callable[[Any, bool], tuple[list[Any], Any]]
-"""Bundles by number, and whether the kernel is the one for directions of both signs -> answers, unknown."""
-
 
 def rates_of(
     mesh: str, scene: tracer.Scene, peers: Sequence[str], pixels: int, repeat: int, check: Check
@@ -116,22 +113,23 @@ class Ours:
 def closest_of_neighbors(device: Any, o: Any, d: Any, eye: Any, active: Any) -> Any:
     """Closest hits of rays that start in one eye, as the renderer finds those of its primary rays: in
     bundles."""
-    from tracer.acceleration.bundles import RAYS
+    from tracer.acceleration.bundles import RAYS, answers_to, in_order
     from tracer.acceleration.first_of_bundles import Bundles, nearest_of_bundles
     from tracer.intersection import closest_triangle, known_triangle
 
     backend = device.backend
 
-    def in_bundles(bundle: Any, both: bool) -> tuple[list[Any], Any]:
+    def in_bundles(bundle: Any, both: bool) -> tuple[Any, Any]:
         starts = [dr.zeros(backend.Float, dr.width(bundle))] * RAYS
         bundles = Bundles(eye, _neighbors(backend, d, bundle), starts)
-        return nearest_of_bundles(backend, device.triangles, bundles, both)
+        found, unknown = nearest_of_bundles(backend, device.triangles, bundles, both)
+        return in_order(backend, found), unknown
 
     def singly(numbers: Any) -> Any:
         ray = free_ray(device, dr.gather(type(o), o, numbers), dr.gather(type(d), d, numbers))
         return closest_triangle(device, ray, dr.full(backend.Bool, True, len(numbers))).primitive
 
-    first = _settled(backend, dr.width(d), in_bundles, singly)
+    first = answers_to(backend.UInt32, dr.width(d), in_bundles, singly)
     nothing = no_hit(backend, dr.width(d))
     return known_triangle(device, free_ray(device, o, d), nothing, active, first)
 
@@ -139,7 +137,7 @@ def closest_of_neighbors(device: Any, o: Any, d: Any, eye: Any, active: Any) -> 
 def hidden_neighbors(device: Any, o: Any, light: Any) -> Any:
     """Mask: some triangle lies between points and a light, as the renderer finds it where primary rays hit:
     in bundles from the light."""
-    from tracer.acceleration.bundles import RAYS
+    from tracer.acceleration.bundles import RAYS, answers_to, in_order
     from tracer.acceleration.shadows_of_bundles import HIDDEN, LIT, LitPoints, hidden_points
 
     backend = device.backend
@@ -147,11 +145,12 @@ def hidden_neighbors(device: Any, o: Any, light: Any) -> Any:
     def reach(p: Any) -> Any:
         return dr.norm(light - p)
 
-    def in_bundles(bundle: Any, both: bool) -> tuple[list[Any], Any]:
+    def in_bundles(bundle: Any, both: bool) -> tuple[Any, Any]:
         points = _neighbors(backend, o, bundle)
         nothing_left = [backend.UInt32(INVALID)] * RAYS
         bundles = LitPoints([reach(p) for p in points], lambda: points, lambda: nothing_left)
-        return hidden_points(backend, device.triangles, light, bundles, both)
+        hidden, unknown = hidden_points(backend, device.triangles, light, bundles, both)
+        return in_order(backend, hidden), unknown
 
     def singly(numbers: Any) -> Any:
         p = dr.gather(type(o), o, numbers)
@@ -160,20 +159,7 @@ def hidden_neighbors(device: Any, o: Any, light: Any) -> Any:
         everything = dr.full(backend.Bool, True, dr.width(numbers))
         return dr.select(any_triangle(device, ray, length, everything), backend.UInt32(HIDDEN), LIT)
 
-    return _settled(backend, dr.width(o), in_bundles, singly) == HIDDEN
-
-
-def _settled(backend: Backend, count: int, in_bundles: InBundles, singly: Callable[[Any], Any]) -> Any:
-    """The answers to so many rays, in bundles and where these do not tell by single rays, as in
-    `tracer.first_hits`."""
-    from tracer.acceleration.bundles import RAYS, in_order, settle_bundles, settle_doubtful
-
-    answers, unknown = in_bundles(dr.arange(backend.UInt32, count // RAYS), False)
-    found = in_order(backend, answers)
-    dr.eval(found, unknown)
-    settle_bundles(found, unknown, lambda numbers: in_order(backend, in_bundles(numbers, True)[0]))
-    settle_doubtful(found, singly)
-    return found
+    return answers_to(backend.UInt32, dr.width(o), in_bundles, singly) == HIDDEN
 
 
 def _neighbors(backend: Backend, vectors: Any, bundle: Any) -> list[Any]:

@@ -55,25 +55,27 @@ def in_order(backend: Backend, answers: list[Any]) -> Any:
     return result
 
 
-def settle_bundles(answers: Any, asked: Any, again: Callable[[Any], Any]) -> None:
-    """Replaces the answers (RAYS n,) of the bundles that are `asked` (n,) again: `again(numbers)` gives those
-    of bundles by number."""
-    numbers = _numbers_where(asked)
+InBundles = Callable[[Any, bool], tuple[Any, Any]]
+"""(numbers (n,) of bundles, kernel for `both` signs: see `Cones`) -> the answers to their rays (RAYS n,),
+mask (n,) of the bundles of which nothing is known."""
+
+
+def answers_to(index: Any, rays: int, in_bundles: InBundles, singly: Callable[[Any], Any]) -> Any:
+    """The answers to so many rays by number: in bundles, and where these are `DOUBTFUL` by single rays,
+    `singly(numbers)`. `index`: the type of numbers and answers."""
+    answers, unknown = in_bundles(dr.arange(index, rays // RAYS), False)
+    dr.eval(answers, unknown)
+    numbers = _numbers_where(unknown)
     if len(numbers) > 0:
-        index = type(numbers)
         ray = dr.arange(index, len(numbers) * RAYS)
         place = dr.gather(index, numbers, ray // RAYS) * RAYS + ray % RAYS
-        dr.scatter(answers, again(numbers), place)
+        dr.scatter(answers, in_bundles(numbers, True)[0], place)
         dr.eval(answers)
-
-
-def settle_doubtful(answers: Any, singly: Callable[[Any], Any]) -> None:
-    """Replaces what is `DOUBTFUL` among the answers (n,) to rays; `singly(numbers)`: those to single rays by
-    number."""
     numbers = _numbers_where(answers == DOUBTFUL)
     if len(numbers) > 0:
         dr.scatter(answers, singly(numbers), numbers)
         dr.eval(answers)
+    return answers
 
 
 def _numbers_where(mask: Any) -> Any:
