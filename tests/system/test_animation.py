@@ -8,7 +8,6 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -222,7 +221,7 @@ LONG = ("turntable", "classic", "--scale", "0.1", "--frames", "30", "-o", "t.mp4
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX systems")
-def test_ctrl_c_and_kill_lose_no_finished_frame(variables: dict[str, str], tmp_path: Path) -> None:
+def test_ctrl_c_loses_no_finished_frame(variables: dict[str, str], tmp_path: Path) -> None:
     whole, broken = tmp_path / "whole", tmp_path / "broken"
     whole.mkdir()
     broken.mkdir()
@@ -242,17 +241,10 @@ def test_ctrl_c_and_kill_lose_no_finished_frame(variables: dict[str, str], tmp_p
     assert len(list(broken.glob("t.*.npz"))) == int(told.group(1)) >= 5
     assert not (broken / "t.mp4").exists()
 
-    generator = np.random.default_rng(6)
-    for _ in range(4):
-        process = start(broken, variables, *LONG, "--resume")
-        time.sleep(generator.uniform(0.3, 3))
-        process.kill()
-        process.communicate()
     process = start(broken, variables, *LONG, "--resume")
     output, talk = process.communicate(timeout=120)
     assert (process.returncode, talk) == (0, "")
-    # Killed in the middle of a movie, a process leaves its temporary file: no other may remove it.
-    assert [name for name in names(broken) if not name.startswith(".tracer-")] == names(whole)
+    assert names(broken) == names(whole)
     told, whole_told = (json.loads((folder / "t.stats.json").read_text()) for folder in (broken, whole))
     assert told["rendered"] < 30 == whole_told["rendered"] and len(whole_told["hits"]) == 14
     for varies in ("rendered", "seconds", "kernels", "peak_memory"):

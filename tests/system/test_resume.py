@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,7 @@ from tracer.film.work_file import MAGIC, _record_at
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX systems")
 
-KILLS = int(os.environ.get("TRACER_KILLS", "12"))
+KILLS = int(os.environ.get("TRACER_KILLS", "24"))
 OPTIONS = (
     "--resolution",
     "256",
@@ -40,19 +41,45 @@ VARIES = ("seconds", "kernels", "peak_memory")
 BAND = 256 * 32 * 36
 """Bytes of a band: color, coverage, depth, z and normal in single precision."""
 
-BEGIN = ["-m", "tracer.cli", "render", "classic", "-o", "x.png", "-o", "x.exr"]
+BEGIN = ("-m", "tracer.cli")
+EAGER = """
+from functools import partial
+from tracer import cli, kept_bands
+from tracer.cli import pictures
+kept_bands.PATIENCE = 0
+pictures.render = partial(pictures.render, rays_per_band=256 * 8 * 16**2)
+cli.main()
+"""
+"""The command, with bands of 8 rows, which are kept from the first one on, not from the second second."""
+
+RENDER = ("render", "classic", "-o", "x.png", "-o", "x.exr")
 
 
-def start(repository: Path, folder: Path, *options: str) -> subprocess.Popen[str]:
-    """A render under way; SIGINT does what it does at a terminal, however the tests were started."""
+def start(
+    repository: Path,
+    folder: Path,
+    *options: str,
+    begin: Sequence[str] = BEGIN,
+    largest: int | None = None,
+) -> subprocess.Popen[str]:
+    """A render under way; SIGINT does what it does at a terminal, however the tests were started. `largest`:
+    bytes of a file, from which on writing fails."""
+
+    def prepare() -> None:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        if largest is not None:
+            import resource
+
+            resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
+
     return subprocess.Popen(
-        [sys.executable, *BEGIN, *OPTIONS, *options],
+        [sys.executable, *begin, *RENDER, *OPTIONS, *options],
         cwd=folder,
         env={**os.environ, "PYTHONPATH": str(repository)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        preexec_fn=prepare,
     )
 
 
@@ -102,6 +129,13 @@ def whole_records(file: Path) -> int:
     return count
 
 
+def finished_bands(talk: str) -> int:
+    """How many records must be in the work file, by what a killed `EAGER` told: one for the settings, and one
+    for each finished band but the last."""
+    told = [json.loads(line)["done"] for line in talk.splitlines() if line.endswith("}")]
+    return told[-1] // (256 * 8) if told else 0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_after_a_signal_the_picture_is_completed(
@@ -132,22 +166,28 @@ def test_after_a_signal_the_picture_is_completed(
 def test_nothing_is_lost_whenever_it_is_killed(
     repository: Path, tmp_path: Path, whole: dict[str, bytes]
 ) -> None:
-    """Killed at random moments and resumed each time; the picture grows, and its last run gives its bytes."""
+    """Killed at random moments and resumed each time; the picture grows, and its last run gives its bytes.
+
+    These runs keep bands from their first one on. All but the last one that a run had finished, which was
+    being written, are there. With the kills of animations (test_long_runs.py) these are 50.
+    """
     times = random.Random(6)
     kills = 0
     kept = 0
     while kills < KILLS:
-        process = start(repository, tmp_path, "--resume")
+        process = start(repository, tmp_path, "--resume", "--progress", "json", begin=("-c", EAGER))
+        assert process.stderr is not None
+        first = process.stderr.readline()  # it has begun to trace
         try:
-            process.wait(times.uniform(0.3, 4.0))
+            process.wait(times.uniform(0, 0.8))
         except subprocess.TimeoutExpired:
             process.kill()
             kills += 1
-        finish(process)
+        talk = first + finish(process)[1]
         work = tmp_path / "x.work"
         assert process.returncode in (0, -signal.SIGKILL)
         if work.exists():
-            assert whole_records(work) >= kept, "finished bands were lost"
+            assert whole_records(work) >= max(kept, finished_bands(talk)), "finished bands were lost"
             kept = whole_records(work)
         elif process.returncode == 0 or kept > 0:  # killed after its work was done, before it ended
             assert contents(tmp_path) == whole
@@ -224,3 +264,22 @@ def test_a_full_disk_is_one_sentence_and_the_rest_goes_on(
         assert contents(folder) == whole
     finally:
         subprocess.run(["umount", str(folder)], check=True)
+
+
+@pytest.mark.slow
+def test_a_work_file_that_may_not_grow_keeps_what_it_has(
+    repository: Path, tmp_path: Path, whole: dict[str, bytes]
+) -> None:
+    """As on a full disk; this one needs no rights."""
+    code, talk = finish(start(repository, tmp_path, largest=4 * BAND))
+    assert code == 2
+    assert re.fullmatch(
+        r"tracer: error: x\.work: cannot be written: File too large; "
+        r"the same command with --resume goes on from x\.work\n",
+        talk,
+    ), talk
+    assert list(contents(tmp_path)) == ["x.work"]
+    code, talk = finish(start(repository, tmp_path, "--resume", "--progress", "json"))
+    assert code == 0
+    assert json.loads(talk.splitlines()[0])["done"] == 3 * 256 * 32, "what was kept is taken over"
+    assert contents(tmp_path) == whole

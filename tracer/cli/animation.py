@@ -19,7 +19,7 @@ from tracer.cli.layers import LOST_LAYERS, loses_layers, told_layers
 from tracer.cli.pictures import Wishes, warn
 from tracer.cli.progress import make_reporter
 from tracer.cli.statistics import save_statistics
-from tracer.errors import TracerError, UsageError
+from tracer.errors import OutputError, TracerError, UsageError
 from tracer.film.counts import counts_in
 from tracer.film.false_color import picture_names
 from tracer.film.frame_record import FrameRecord
@@ -111,10 +111,17 @@ class _Animation:
 
     def make(self) -> int:
         """Renders what is not finished, and the movies; returns the exit code."""
-        frames, files = self._course.frames, self._job.files
         for warning in warnings_of(self._job.scene):
             warn(warning, self._wishes)
         self._record.start(self._wishes.resume)
+        try:
+            return self._make()
+        except OutputError as error:
+            finished = f"{self._record.finished} of {len(self._course.frames)} frames"
+            raise OutputError(f"{error}; {finished} are finished, --resume goes on") from error
+
+    def _make(self) -> int:
+        frames, files = self._course.frames, self._job.files
         missing = [frame for frame in frames if not self._record.is_done(frame, files.all_of(frame))]
         for frame in set(frames).difference(missing):
             self._statistics.add_counts(self._record.counts(frame))

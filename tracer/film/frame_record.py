@@ -39,6 +39,11 @@ class FrameRecord:
         """The record itself."""
         return self.folder / NAME
 
+    @property
+    def finished(self) -> int:
+        """How many frames are finished."""
+        return len(self._frames)
+
     def start(self, resume: bool) -> None:
         """Makes the folder, and finds what is finished, if that is wanted; raises `UsageError` for frames of
         another scene or other settings."""

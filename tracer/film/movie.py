@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
 from collections.abc import Iterable
@@ -75,7 +76,8 @@ def write_movie(path: str | os.PathLike[str], frames: Iterable[Path], rate: floa
                 encoder.kill()
                 raise
         if encoder.returncode != 0 or not temporary.stat().st_size:
-            raise OutputError(f"{os.fspath(path)}: ffmpeg could not write it: {_last_line(talk)}")
+            reason = _last_line(talk) or _end_of(encoder.returncode)
+            raise OutputError(f"{os.fspath(path)}: ffmpeg could not write it: {reason}")
 
 
 def _feed(encoder: subprocess.Popen[bytes], frames: Iterable[Path]) -> None:
@@ -93,4 +95,9 @@ def _feed(encoder: subprocess.Popen[bytes], frames: Iterable[Path]) -> None:
 def _last_line(talk: IO[bytes]) -> str:
     talk.seek(0)
     lines = talk.read().decode(errors="replace").split("\n")
-    return next((line.strip() for line in reversed(lines) if line.strip()), "no reason given")
+    return next((line.strip() for line in reversed(lines) if line.strip()), "")
+
+
+def _end_of(code: int) -> str:
+    """How a process ended that says nothing."""
+    return (signal.strsignal(-code) if code < 0 else None) or "no reason given"
