@@ -52,6 +52,8 @@ def visit(page: Any, choices: Sequence[str]) -> None:
     for answers in product((False, True), repeat=len(choices)):
         for name, value in zip(choices, answers, strict=True):
             page.evaluate(CHANGE, ["choose", {"name": name, "value": value}])
+        page.evaluate("() => { viewer.lens.clear(); viewer.link.send({ kind: 'look', x: 0.5, y: 0.5 }); }")
+        page.locator("#tree").wait_for(timeout=120_000)
         for layer, cutoff in product(LAYERS, CUTOFFS):
             page.evaluate(CHANGE, ["show", {"layer": layer}])
             page.evaluate(CHANGE, ["set", {"name": "cutoff", "value": cutoff}])
