@@ -82,7 +82,7 @@ class _Lens:
         """The trees of the pixel's sub-rays."""
         backend, count = self.backend, n * n
         lane = dr.arange(backend.UInt32, count)
-        column, row, numbers = (dr.full(backend.UInt32, value, count) for value in (x, y, number))
+        column, row, numbers = (dr.opaque(backend.UInt32, value, count) for value in (x, y, number))
         self.pixel = number
         active = dr.full(backend.Bool, True, count)
         pixels = PixelGrid(lane, backend.opaque_id(count), column, row, numbers, backend.opaque_id(n), active)
@@ -112,7 +112,7 @@ class _Lens:
         base = path.throughput * own * device.not_ambient
         children = spawn(device, path, surface, material, base, hit.valid)
         dr.eval(hit, surface, material, own, children)
-        number = dr.full(backend.UInt32, self.pixel, len(level.kinds))
+        number = dr.opaque(backend.UInt32, self.pixel, len(level.kinds))
         sub_ray = backend.UInt32(level.sub_rays)
         lights = self.lights.terms(path, surface, material, hit.valid, number, sub_ray)
         seen = _Columns(len(level.kinds), path, hit, surface, material, own, children)

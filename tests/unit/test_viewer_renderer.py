@@ -204,6 +204,16 @@ def test_the_rays_of_a_pixel_lie_in_the_picture() -> None:
     assert all(ray["line"][0] == pytest.approx(primary["line"][1], abs=1e-4) for ray in children)
 
 
+def test_another_pixel_under_the_lens_compiles_nothing() -> None:
+    scene = tracer.load("optics_mirror", overrides=["camera.resolution=[64, 48]"])
+    looked_at(scene, 32, 24, "llvm")
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        looked_at(scene, 33, 25, "llvm")
+        history = dr.kernel_history([dr.KernelType.JIT])
+    assert history and not [one for one in history if one["cache_disk"] or not one["cache_hit"]]
+
+
 def test_a_renderer_at_rest_takes_no_time(watcher: Watcher) -> None:
     """Its thread waits; it does not turn in circles."""
     watcher.look()
