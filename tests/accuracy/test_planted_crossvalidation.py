@@ -159,7 +159,7 @@ def absorbed_share_is_one(patch: pytest.MonkeyPatch) -> None:
 
 def cutoff_doubled(patch: pytest.MonkeyPatch) -> None:
     """Rays end at twice the weight that the scene names."""
-    module = import_module("tracer.render")  # the package gives the name to the function
+    module = import_module("tracer.passes")
     true = module.compile_scene
 
     def coarse(scene: tracer.Scene, backend: Any) -> Any:
