@@ -10,7 +10,7 @@ import click
 
 from tracer.cli.failures import talk
 from tracer.cli.interruption import Interruption
-from tracer.cli.options import report_options
+from tracer.cli.options import report_options, threads_option
 from tracer.cli.progress import KINDS, make_reporter
 
 if TYPE_CHECKING:
@@ -25,9 +25,7 @@ if TYPE_CHECKING:
 @click.option("--full", "full", flag_value=True, help="All scenes, curves and meshes, about half an hour.")
 @click.option("--scene", "scenes", multiple=True, metavar="SCENE", help="Only this scene. Repeatable.")
 @click.option("--only", multiple=True, metavar="PART", help="Only this part of the set. Repeatable.")
-@click.option(
-    "--threads", type=click.IntRange(1, 1024), metavar="N", help="CPU threads.  [default: all cores]"
-)
+@threads_option
 @click.option(
     "--repeat", type=click.IntRange(1, 1000), metavar="N", help="Rounds.  [default: 5, with --full 9]"
 )

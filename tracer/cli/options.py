@@ -15,6 +15,17 @@ LARGEST_SIDE = 65535
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
+threads_option = click.option(
+    "--threads", type=click.IntRange(1, 1024), metavar="N", help="CPU threads.  [default: all cores]"
+)
+
+
+def backend_option(text: str) -> Callable[[Command], Command]:
+    """`--backend`, with what its help says."""
+    kinds = click.Choice(("auto", "llvm", "cuda"))
+    return click.option("--backend", type=kinds, default="auto", show_default=True, help=text)
+
+
 class Size(click.ParamType):
     """A number of bytes such as 2G, 500M, 1.5GiB."""
 
@@ -142,16 +153,8 @@ _PICTURE_OPTIONS = (
         show_default=True,
         help="Arithmetic.",
     ),
-    click.option(
-        "--backend",
-        type=click.Choice(("auto", "llvm", "cuda")),
-        default="auto",
-        show_default=True,
-        help="Processor.",
-    ),
-    click.option(
-        "--threads", type=click.IntRange(1, 1024), metavar="N", help="CPU threads.  [default: all cores]"
-    ),
+    backend_option("Processor."),
+    threads_option,
     click.option(
         "--memory",
         type=Size(),

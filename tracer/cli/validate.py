@@ -10,7 +10,7 @@ import click
 
 from tracer.cli.failures import talk
 from tracer.cli.interruption import Interruption
-from tracer.cli.options import report_options, scene_options
+from tracer.cli.options import backend_option, report_options, scene_options, threads_option
 from tracer.cli.progress import KINDS, make_reporter
 
 if TYPE_CHECKING:
@@ -48,16 +48,8 @@ PRECISIONS = {"single": ("single",), "double": ("double",), "both": ("single", "
     show_default=True,
     help="Our arithmetic; Mitsuba always has single precision.",
 )
-@click.option(
-    "--backend",
-    type=click.Choice(("auto", "llvm", "cuda")),
-    default="auto",
-    show_default=True,
-    help="Our processor; Mitsuba stays on LLVM.",
-)
-@click.option(
-    "--threads", type=click.IntRange(1, 1024), metavar="N", help="CPU threads.  [default: all cores]"
-)
+@backend_option("Our processor; Mitsuba stays on LLVM.")
+@threads_option
 @report_options("reports/crossvalidation", "report")
 @click.option(
     "--headline",

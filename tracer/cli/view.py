@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tracer.cli.failures import talk
-from tracer.cli.options import LARGEST_SIDE, scene_options
+from tracer.cli.options import LARGEST_SIDE, backend_option, scene_options, threads_option
 from tracer.cli.questions import QUESTIONS
 from tracer.errors import MachineError, UsageError
 
@@ -47,16 +47,8 @@ USUAL_PORT = 8433
     help=f"Port to listen at.  [default: {USUAL_PORT}, or a free one where that is taken]",
 )
 @click.option("--browser/--no-browser", default=None, help="Open the page.  [default: at a terminal]")
-@click.option(
-    "--backend",
-    type=click.Choice(("auto", "llvm", "cuda")),
-    default="auto",
-    show_default=True,
-    help="Processor.",
-)
-@click.option(
-    "--threads", type=click.IntRange(1, 1024), metavar="N", help="CPU threads.  [default: all cores]"
-)
+@backend_option("Processor.")
+@threads_option
 @scene_options
 def view(
     scene: str,
