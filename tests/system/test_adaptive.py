@@ -6,8 +6,6 @@ import json
 import os
 import re
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -15,27 +13,10 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.system.under_way import finish, start
+
 ADAPTIVE = ("--supersample", "adaptive")
 PLACE = ("--resolution", "320", "240")
-
-
-def start(repository: Path, folder: Path, *arguments: str) -> subprocess.Popen[str]:
-    """A command under way; SIGINT does what it does at a terminal, however the tests were started."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "tracer.cli", *arguments],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(repository)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    )
-
-
-def finish(process: subprocess.Popen[str]) -> tuple[int, str]:
-    """Exit code and stderr."""
-    _, talk = process.communicate(timeout=120)
-    return process.returncode, talk
 
 
 def picture(file: Path) -> np.ndarray:

@@ -49,29 +49,27 @@ def test_a_library_that_only_looks_right_is_found_out(
     assert "a test kernel failed on it" in report["llvm"]["error"]
 
 
-def test_the_command_for_mitsuba_carries_the_version(monkeypatch: pytest.MonkeyPatch) -> None:
+def leave_out(package: str, patch: pytest.MonkeyPatch) -> None:
+    """As if the package were not installed."""
     version = importlib.metadata.version
 
-    def without_mitsuba(name: str) -> str:
-        if name == "mitsuba":
+    def of_others(name: str) -> str:
+        if name == package:
             raise importlib.metadata.PackageNotFoundError(name)
         return version(name)
 
-    monkeypatch.setattr(importlib.metadata, "version", without_mitsuba)
+    patch.setattr(importlib.metadata, "version", of_others)
+
+
+def test_the_command_for_mitsuba_carries_the_version(monkeypatch: pytest.MonkeyPatch) -> None:
+    leave_out("mitsuba", monkeypatch)
     gap = next(gap for gap in diagnose()["missing"] if gap["what"].startswith("mitsuba"))
     assert gap["command"].endswith("-m pip install mitsuba==3.9.1")
     assert not gap["required"]
 
 
 def test_what_the_viewer_lacks_is_optional(monkeypatch: pytest.MonkeyPatch) -> None:
-    version = importlib.metadata.version
-
-    def without_uvicorn(name: str) -> str:
-        if name == "uvicorn":
-            raise importlib.metadata.PackageNotFoundError(name)
-        return version(name)
-
-    monkeypatch.setattr(importlib.metadata, "version", without_uvicorn)
+    leave_out("uvicorn", monkeypatch)
     gap = next(gap for gap in diagnose()["missing"] if gap["what"] == "uvicorn")
     assert gap["needed_for"] == "`tracer view`" and not gap["required"]
     assert "-m pip install" in gap["command"] and "uvicorn" in gap["command"]

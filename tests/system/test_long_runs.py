@@ -9,12 +9,15 @@ import random
 import re
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import pytest
+
+from tests.system import under_way
+from tests.system.under_way import finish
 
 pytestmark = [
     pytest.mark.slow,
@@ -32,33 +35,8 @@ Start = Callable[..., subprocess.Popen[str]]
 
 @pytest.fixture
 def start(repository: Path, tmp_path: Path) -> Start:
-    """Starts `tracer` in the folder of the test; `largest`: bytes of a file, from which on writing fails."""
-
-    def popen(*arguments: str, largest: int | None = None) -> subprocess.Popen[str]:
-        def prepare() -> None:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
-            if largest is not None:
-                import resource
-
-                resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
-
-        return subprocess.Popen(
-            [sys.executable, "-m", "tracer.cli", *arguments],
-            cwd=tmp_path,
-            env={**os.environ, "PYTHONPATH": str(repository)},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            preexec_fn=prepare,
-        )
-
-    return popen
-
-
-def finish(process: subprocess.Popen[str]) -> tuple[int, str]:
-    """Exit code and stderr."""
-    _, talk = process.communicate(timeout=120)
-    return process.returncode, talk
+    """Starts `tracer` in the folder of the test."""
+    return partial(under_way.start, repository, tmp_path)
 
 
 def contents(folder: Path) -> dict[str, bytes]:

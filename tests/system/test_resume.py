@@ -8,13 +8,14 @@ import random
 import re
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
+from tests.system import under_way
+from tests.system.under_way import finish
 from tracer.film.work_file import MAGIC, _record_at
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX systems")
@@ -41,7 +42,6 @@ VARIES = ("seconds", "kernels", "peak_memory")
 BAND = 256 * 32 * 36
 """Bytes of a band: color, coverage, depth, z and normal in single precision."""
 
-BEGIN = ("-m", "tracer.cli")
 EAGER = """
 from functools import partial
 from tracer import cli, kept_bands
@@ -59,34 +59,11 @@ def start(
     repository: Path,
     folder: Path,
     *options: str,
-    begin: Sequence[str] = BEGIN,
+    begin: Sequence[str] = under_way.COMMAND,
     largest: int | None = None,
 ) -> subprocess.Popen[str]:
-    """A render under way; SIGINT does what it does at a terminal, however the tests were started. `largest`:
-    bytes of a file, from which on writing fails."""
-
-    def prepare() -> None:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        if largest is not None:
-            import resource
-
-            resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
-
-    return subprocess.Popen(
-        [sys.executable, *begin, *RENDER, *OPTIONS, *options],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(repository)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=prepare,
-    )
-
-
-def finish(process: subprocess.Popen[str]) -> tuple[int, str]:
-    """Exit code and stderr."""
-    _, talk = process.communicate(timeout=120)
-    return process.returncode, talk
+    """The render under way, with more options."""
+    return under_way.start(repository, folder, *RENDER, *OPTIONS, *options, begin=begin, largest=largest)
 
 
 @pytest.fixture(scope="module")
