@@ -10,10 +10,9 @@ from typing import Any
 
 import drjit as dr
 
-from tracer.acceleration.bundles import RAYS, answers_to, in_order
+from tracer.acceleration.bundles import answers_to, in_order, neighboring_points, neighbors
 from tracer.acceleration.shadows_of_bundles import HIDDEN, LIT, LitPoints, certain_reach, hidden_points
 from tracer.arrival import segment_to
-from tracer.backends import Backend
 from tracer.canvas import DeviceCanvas
 from tracer.device_scene import DeviceScene
 from tracer.direct_light import may_be_lit
@@ -88,13 +87,10 @@ def bundled(scene: DeviceScene, light: Any, where: list[Any], numbers: Any, both
     assert scene.triangles is not None
     backend = scene.backend
     *place, primitives, reach = where
-
-    def points() -> list[Any]:
-        x, y, z = (_neighbors(backend, values, numbers) for values in place)
-        return [backend.Vector3(*p) for p in zip(x, y, z, strict=True)]
-
     bundles = LitPoints(
-        _neighbors(backend, reach, numbers), points, lambda: _neighbors(backend, primitives, numbers)
+        reach=neighbors(backend, reach, numbers),
+        points=lambda: neighboring_points(backend, place, numbers),
+        primitives=lambda: neighbors(backend, primitives, numbers),
     )
     answers, unknown = hidden_points(backend, scene.triangles, light, bundles, both)
     return {"hidden": in_order(backend, answers), "unknown": dr.select(unknown, backend.UInt32(1), 0)}
@@ -131,15 +127,6 @@ def _first_surface(
     everything = dr.full(scene.backend.Bool, True, dr.width(number))
     hit = closest_hit(scene, ray, pixels.active, known=Known(everything, primitive))
     return ray, surface_at(scene, ray, hit, pixels.active), pixels.active & hit.valid
-
-
-def _neighbors(backend: Backend, values: Any, bundle: Any) -> list[Any]:
-    """The values (RAYS n,) of the RAYS rays of bundles, (n,) each."""
-    # Packets have 8 words at most.
-    packet = backend.IdN if type(values) is backend.UInt32 else backend.FloatN
-    shape = (8, dr.width(bundle))
-    parts = [dr.gather(packet, values, bundle * (RAYS // 8) + half, shape=shape) for half in range(RAYS // 8)]
-    return [part[k] for part in parts for k in range(8)]
 
 
 def _reach_of(light: int) -> str:

@@ -113,7 +113,7 @@ class Ours:
 def closest_of_neighbors(device: Any, o: Any, d: Any, eye: Any, active: Any) -> Any:
     """Closest hits of rays that start in one eye, as the renderer finds those of its primary rays: in
     bundles."""
-    from tracer.acceleration.bundles import RAYS, answers_to, in_order
+    from tracer.acceleration.bundles import RAYS, answers_to, in_order, neighboring_points
     from tracer.acceleration.first_of_bundles import Bundles, nearest_of_bundles
     from tracer.intersection import closest_triangle, known_triangle
 
@@ -121,7 +121,7 @@ def closest_of_neighbors(device: Any, o: Any, d: Any, eye: Any, active: Any) -> 
 
     def in_bundles(bundle: Any, both: bool) -> tuple[Any, Any]:
         starts = [dr.zeros(backend.Float, dr.width(bundle))] * RAYS
-        bundles = Bundles(eye, _neighbors(backend, d, bundle), starts)
+        bundles = Bundles(eye, neighboring_points(backend, d, bundle), starts)
         found, unknown = nearest_of_bundles(backend, device.triangles, bundles, both)
         return in_order(backend, found), unknown
 
@@ -137,7 +137,7 @@ def closest_of_neighbors(device: Any, o: Any, d: Any, eye: Any, active: Any) -> 
 def hidden_neighbors(device: Any, o: Any, light: Any) -> Any:
     """Mask: some triangle lies between points and a light, as the renderer finds it where primary rays hit:
     in bundles from the light."""
-    from tracer.acceleration.bundles import RAYS, answers_to, in_order
+    from tracer.acceleration.bundles import RAYS, answers_to, in_order, neighboring_points
     from tracer.acceleration.shadows_of_bundles import HIDDEN, LIT, LitPoints, hidden_points
 
     backend = device.backend
@@ -146,7 +146,7 @@ def hidden_neighbors(device: Any, o: Any, light: Any) -> Any:
         return dr.norm(light - p)
 
     def in_bundles(bundle: Any, both: bool) -> tuple[Any, Any]:
-        points = _neighbors(backend, o, bundle)
+        points = neighboring_points(backend, o, bundle)
         nothing_left = [backend.UInt32(INVALID)] * RAYS
         bundles = LitPoints([reach(p) for p in points], lambda: points, lambda: nothing_left)
         hidden, unknown = hidden_points(backend, device.triangles, light, bundles, both)
@@ -160,20 +160,6 @@ def hidden_neighbors(device: Any, o: Any, light: Any) -> Any:
         return dr.select(any_triangle(device, ray, length, everything), backend.UInt32(HIDDEN), LIT)
 
     return answers_to(backend.UInt32, dr.width(o), in_bundles, singly) == HIDDEN
-
-
-def _neighbors(backend: Backend, vectors: Any, bundle: Any) -> list[Any]:
-    """The vectors (3, n) of the RAYS rays of bundles, read in packets."""
-    from tracer.acceleration.bundles import RAYS
-
-    parts = [
-        [
-            dr.gather(backend.FloatN, c, bundle * (RAYS // 8) + half, shape=(8, dr.width(bundle)))
-            for c in vectors
-        ]
-        for half in range(RAYS // 8)
-    ]
-    return [backend.Vector3(*(c[k] for c in part)) for part in parts for k in range(8)]
 
 
 def any_triangle(device: Any, ray: Ray, length: Any, active: Any) -> Any:

@@ -55,6 +55,21 @@ def in_order(backend: Backend, answers: list[Any]) -> Any:
     return result
 
 
+def neighbors(backend: Backend, values: Any, bundle: Any) -> list[Any]:
+    """The values (RAYS n,) of the RAYS rays of bundles by number, (n,) each."""
+    # Packets have 8 words at most.
+    packet = backend.IdN if type(values) is backend.UInt32 else backend.FloatN
+    shape, halves = (8, dr.width(bundle)), range(RAYS // 8)
+    parts = [dr.gather(packet, values, bundle * len(halves) + half, shape=shape) for half in halves]
+    return [part[k] for part in parts for k in range(8)]
+
+
+def neighboring_points(backend: Backend, points: Any, bundle: Any) -> list[Any]:
+    """The same of vectors (3, RAYS n)."""
+    components = (neighbors(backend, component, bundle) for component in points)
+    return [backend.Vector3(*point) for point in zip(*components, strict=True)]
+
+
 InBundles = Callable[[Any, bool], tuple[Any, Any]]
 """(numbers (n,) of bundles, kernel for `both` signs: see `Cones`) -> the answers to their rays (RAYS n,),
 mask (n,) of the bundles of which nothing is known."""
