@@ -21,7 +21,7 @@ import drjit as dr
 from tracer.acceleration.layout import NodeLists
 from tracer.acceleration.slabs import SMALLEST_COMPONENT
 from tracer.acceleration.triangle import CONTACT_SLACK, Triangle, TriangleTables, fetch_triangle
-from tracer.acceleration.walk import Node, octant_of, walk, within_root
+from tracer.acceleration.walk import Node, octant_of, walk_within_root
 from tracer.backends import Backend
 from tracer.ray import max_abs, select_max, select_min
 from tracer.shafts import Shaft
@@ -58,19 +58,16 @@ def first_verdict(
     def crosses(node: Node, verdict: Any) -> Any:
         return slabs.crossed(node)
 
-    def look(verdict: Any) -> Any:
-        return walk(
-            backend,
-            lists,
-            slabs.octant,
-            crosses,
-            test=lambda slot, verdict: meet(slot),
-            state=verdict,
-            done=lambda verdict: verdict != CLEAR,
-        )
-
-    clear = dr.full(backend.UInt32, CLEAR, dr.width(shaft.apex))
-    return within_root(backend, lists, slabs.octant, crosses, active, clear, look)
+    return walk_within_root(
+        backend,
+        lists,
+        slabs.octant,
+        crosses,
+        test=lambda slot, verdict: meet(slot),
+        active=active,
+        state=dr.full(backend.UInt32, CLEAR, dr.width(shaft.apex)),
+        done=lambda verdict: verdict != CLEAR,
+    )
 
 
 def _meet(backend: Backend, triangle: Triangle, shaft: Shaft, normal: Any) -> Any:

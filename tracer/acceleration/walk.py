@@ -122,3 +122,25 @@ def walk(
         label="hierarchy",
     )
     return state
+
+
+def walk_within_root(
+    backend: Backend,
+    lists: NodeLists,
+    octant: Any,
+    crosses: Callable[[Node, Any], Any],
+    test: Callable[[Any, Any], Any],
+    active: Any,
+    state: Any,
+    done: Callable[[Any], Any] | None = None,
+) -> Any:
+    """`walk` where the root's box is crossed, the state elsewhere."""
+    return within_root(
+        backend,
+        lists,
+        octant,
+        crosses,
+        active,
+        state,
+        lambda state: walk(backend, lists, octant, crosses, test, state, done),
+    )

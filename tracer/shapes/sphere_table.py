@@ -12,7 +12,7 @@ import numpy as np
 from tracer.acceleration.build import build_over_boxes
 from tracer.acceleration.layout import NodeLists, threaded
 from tracer.acceleration.slabs import Slabs
-from tracer.acceleration.walk import Node, walk, within_root
+from tracer.acceleration.walk import Node, walk_within_root
 from tracer.backends import Backend
 from tracer.ray import Hit, Ray, Segment
 from tracer.shafts import Ball, ball_around
@@ -99,18 +99,16 @@ class SphereTable:
         def crosses(node: Node, state: Any) -> Any:
             return slabs.crossed(node, limit(state))
 
-        def visit_all(state: Any) -> Any:
-            return walk(
-                backend,
-                lists,
-                slabs.octant,
-                crosses,
-                test=lambda slot, state: step(state, self.fetch(slot)),
-                state=state,
-                done=done,
-            )
-
-        return within_root(backend, lists, slabs.octant, crosses, active, state, visit_all)
+        return walk_within_root(
+            backend,
+            lists,
+            slabs.octant,
+            crosses,
+            test=lambda slot, state: step(state, self.fetch(slot)),
+            active=active,
+            state=state,
+            done=done,
+        )
 
     def fetch(self, slot: Any) -> SphereSlot:
         """The sphere in a slot of the hierarchy."""
