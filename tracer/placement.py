@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)
@@ -78,3 +79,10 @@ def cosine_sine(degrees: float) -> tuple[float, float]:
         return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarter) % 4]
     angle = np.radians(degrees)
     return float(np.cos(angle)), float(np.sin(angle))
+
+
+def turned_about(vector: NDArray, axis: NDArray, degrees: float) -> NDArray:
+    """A vector (3,) turned counterclockwise about a unit axis (3,) (Rodrigues' formula)."""
+    cos, sin = cosine_sine(degrees)
+    turned: NDArray = vector * cos + np.cross(axis, vector) * sin + axis * (axis @ vector) * (1 - cos)
+    return turned

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracer.errors import SceneError
-from tracer.placement import cosine_sine
+from tracer.placement import turned_about
 from tracer.scene import Scene
 from tracer.scene_warnings import finite_extents
 
@@ -39,7 +39,7 @@ def turned(scene: Scene, degrees: float, around: Point) -> Scene:
     camera, middle = scene.camera, np.array(around)
 
     def moved(point: Point, axis: NDArray) -> Point:
-        x, y, z = (middle + _rotated(np.array(point) - middle, axis, degrees)).tolist()
+        x, y, z = (middle + turned_about(np.array(point) - middle, axis, degrees)).tolist()
         return x, y, z
 
     pose: dict[str, object]
@@ -52,10 +52,3 @@ def turned(scene: Scene, degrees: float, around: Point) -> Scene:
             "rotate": (camera.rotate[0] + degrees, camera.rotate[1]),
         }
     return scene.model_copy(update={"camera": camera.model_copy(update=pose)})
-
-
-def _rotated(vector: NDArray, axis: NDArray, degrees: float) -> NDArray:
-    """A vector turned counterclockwise about a unit axis (Rodrigues' formula)."""
-    cos, sin = cosine_sine(degrees)
-    turned: NDArray = vector * cos + np.cross(axis, vector) * sin + axis * (axis @ vector) * (1 - cos)
-    return turned

@@ -158,10 +158,8 @@ def _source(
 def _resized(scene: Scene, resolution: tuple[int, int] | None) -> Scene:
     """The scene at another size; the vertical extent of the canvas stays."""
     from tracer.canvas import Canvas
-    from tracer.viewer.camera import changed
+    from tracer.viewer.camera import on_canvas
 
     if resolution is not None:
-        canvas = Canvas.of(scene.camera, scene.literal).resized(*resolution)
-        pixel = {} if scene.camera.is_look_at else {"pixel_size": canvas.pixel_size}
-        scene.camera = changed(scene.camera, resolution=resolution, **pixel)
+        scene.camera = on_canvas(scene.camera, Canvas.of(scene.camera, scene.literal).resized(*resolution))
     return scene

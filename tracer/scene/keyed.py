@@ -69,7 +69,7 @@ def _path_of(scene: Any, track: Track) -> Path:
     for part in path:
         step = _step(node, part, track.key)
         walked.append(step)
-        node = _child(node, step)
+        node = child_of(node, step)
     return tuple(walked)
 
 
@@ -96,13 +96,14 @@ def _step(node: Any, part: Part, key: str) -> Part:
     return str(part)
 
 
-def _child(node: Any, step: Part) -> Any:
+def child_of(node: Any, step: Part) -> Any:
+    """What lies a step of a path below a record, a table or a list."""
     return getattr(node, str(step)) if isinstance(node, Record) else node[step]
 
 
 def _value_at(node: Any, path: Path) -> Any:
     for step in path:
-        node = _child(node, step)
+        node = child_of(node, step)
     return node
 
 
@@ -136,7 +137,7 @@ def _with_value(node: Any, path: Path, value: Any) -> Any:
     """A copy of `node` with the value at the end of the path; raises `SceneError` where it does not fit."""
     if not path:
         return round(value) if _is_whole(node) and isinstance(value, float) else value
-    child = _with_value(_child(node, path[0]), path[1:], value)
+    child = _with_value(child_of(node, path[0]), path[1:], value)
     if isinstance(node, Record):
         twin = node.model_copy()
         setattr(twin, str(path[0]), child)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tracer.camera import Camera
 from tracer.canvas import Canvas
-from tracer.placement import cosine_sine
+from tracer.placement import cosine_sine, turned_about
 
 STEEPEST = 89.0  # degrees above or below the horizon that an orbit reaches: beyond, up and down change places
 NEAREST = 1e-3  # share of the distance to its target within which a look-at camera never comes in one step
@@ -102,21 +102,21 @@ def changed(camera: Camera, **values: Any) -> Camera:
     return twin
 
 
+def on_canvas(camera: Camera, canvas: Canvas, **values: Any) -> Camera:
+    """The camera with the resolution of another canvas of its own, and with other values; the framing is that
+    canvas's."""
+    pixel = {} if camera.is_look_at else {"pixel_size": canvas.pixel_size}
+    return changed(camera, resolution=(canvas.width, canvas.height), **pixel, **values)
+
+
 def _look_at_orbit(camera: Camera, left: float, up: float) -> Camera:
     assert camera.origin is not None and camera.target is not None
     axis = np.array(camera.up) / np.linalg.norm(camera.up)
     canvas = Canvas.of(camera)
     height = float(np.degrees(np.arcsin(np.clip(canvas.forward @ axis, -1, 1))))
     up = float(np.clip(height + up, -STEEPEST, STEEPEST)) - height
-    arm = _turned(np.subtract(camera.origin, camera.target), canvas.x, up)
-    return changed(camera, origin=_triple(camera.target + _turned(arm, axis, left)))
-
-
-def _turned(vector: Vector, axis: Vector, degrees: float) -> Vector:
-    """A vector turned counterclockwise about a unit axis (Rodrigues' formula)."""
-    cos, sin = cosine_sine(degrees)
-    result: Vector = vector * cos + np.cross(axis, vector) * sin + axis * (axis @ vector) * (1 - cos)
-    return result
+    arm = turned_about(np.subtract(camera.origin, camera.target), canvas.x, up)
+    return changed(camera, origin=_triple(camera.target + turned_about(arm, axis, left)))
 
 
 def _frame(canvas: Canvas) -> Vector:

@@ -18,7 +18,7 @@ from tracer.film.png import encode_png
 from tracer.render import render
 from tracer.scene import Scene
 from tracer.scene.contents import snapshot
-from tracer.viewer.camera import changed
+from tracer.viewer.camera import on_canvas
 
 LARGEST = 640
 """Columns of the compared pictures at most."""
@@ -62,10 +62,7 @@ def _small(scene: Scene) -> Scene:
     """The scene at the size of the comparison."""
     twin, camera = snapshot(scene), scene.camera
     canvas = Canvas.of(camera, scene.literal).scaled(min(1.0, LARGEST / camera.resolution[0]))
-    values: dict[str, Any] = {"resolution": (canvas.width, canvas.height), "depth_of_field": None}
-    if not camera.is_look_at:
-        values["pixel_size"] = canvas.pixel_size
-    twin.camera = changed(camera, **values)
+    twin.camera = on_canvas(camera, canvas, depth_of_field=None)
     return twin
 
 

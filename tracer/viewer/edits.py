@@ -6,6 +6,7 @@ from typing import Any
 
 from tracer.material import Material
 from tracer.scene import Scene
+from tracer.scene.keyed import child_of
 from tracer.viewer.controls import SHARES, Path
 
 Edits = dict[Path, float]
@@ -17,7 +18,7 @@ def value_at(scene: Scene, path: Path) -> float | None:
     value: Any = scene
     for part in path:
         try:
-            value = _below(value, part)
+            value = child_of(value, part)
         except (AttributeError, IndexError, KeyError, TypeError):
             return None
     return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else None
@@ -74,9 +75,5 @@ def _balanced(material: Material, key: str, value: float) -> tuple[float, float]
 def _record_at(scene: Scene, way: list[str | int]) -> Any:
     record: Any = scene
     for part in way:
-        record = _below(record, part)
+        record = child_of(record, part)
     return record
-
-
-def _below(record: Any, part: str | int) -> Any:
-    return record[part] if type(record) in (list, dict, tuple) else getattr(record, str(part))
