@@ -16,7 +16,7 @@ import drjit as dr
 import numpy as np
 
 from tracer.errors import MachineError, UsageError
-from tracer.llvm import ensure_llvm
+from tracer.llvm import ensure_llvm, start_drjit
 from tracer.subnormals import flushed_subnormals
 
 if TYPE_CHECKING:
@@ -116,6 +116,7 @@ def find_backend(name: str = "auto", precision: str = "single", gradients: bool 
 
 def has_cuda() -> bool:
     """True where Dr.Jit finds a CUDA driver and a GPU."""
+    start_drjit()
     return bool(dr.has_backend(dr.JitBackend.CUDA))
 
 

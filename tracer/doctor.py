@@ -29,6 +29,7 @@ _PACKAGES = ("drjit", "mitsuba", "numpy", "pydantic", "opencv-python-headless", 
 _TRY_BACKENDS = """
 import json, sys
 import drjit as dr
+dr.sync_thread()  # waits until Dr.Jit has started, as tracer.llvm.start_drjit explains
 def works(name):
     module = __import__(f"drjit.{name}", fromlist=["Float"])
     return dr.sum(dr.maximum(dr.arange(module.Float, 3), module.Float(1)))[0] == 4

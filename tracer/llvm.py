@@ -12,6 +12,7 @@ import importlib
 import os
 import sys
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from tracer.errors import MachineError
@@ -79,11 +80,22 @@ def select_llvm() -> None:
         os.environ[VARIABLE] = "no usable LLVM"
         try:
             with captured_stderr():
-                importlib.import_module("drjit")
+                start_drjit()
         finally:
             del os.environ[VARIABLE]
             if chosen is not None:
                 os.environ[VARIABLE] = chosen
+
+
+@cache
+def start_drjit() -> None:
+    """Imports Dr.Jit and waits until it has started, which it does in a thread of its own.
+
+    That thread holds Dr.Jit's lock, and where LLVM is missing or too old it needs Python's for its warning.
+    Whoever asks Dr.Jit anything meanwhile holds Python's lock and waits for Dr.Jit's: both stand still for
+    ever; `sync_thread` waits without Python's lock.
+    """
+    importlib.import_module("drjit").sync_thread()
 
 
 def ensure_llvm() -> LlvmLibrary:
@@ -93,6 +105,7 @@ def ensure_llvm() -> LlvmLibrary:
     word, because a program that imported `drjit` before `tracer` has let it choose another library.
     """
     select_llvm()
+    start_drjit()
     import drjit as dr
 
     chosen = os.environ.get(VARIABLE)

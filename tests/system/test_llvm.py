@@ -81,6 +81,30 @@ def test_dr_jit_imported_too_early_with_an_old_library_does_not_abort(repository
     assert f"LLVM {major}" in done.stderr.splitlines()[-1]
 
 
+@pytest.mark.parametrize("question", ["tracer.llvm.ensure_llvm", "tracer.backends.has_cuda"])
+def test_a_warning_while_dr_jit_starts_does_not_hang_the_process(repository: Path, question: str) -> None:
+    # Dr.Jit warns from a thread of its own. Here that takes a second, in which the main thread asks.
+    program = f"""
+import importlib, os, sys, time
+import tracer.llvm
+class SlowError:
+    def write(self, text):
+        time.sleep(seconds.pop() if seconds else 0)
+    def flush(self):
+        pass
+seconds = [1]
+sys.stderr = SlowError()
+os.environ[tracer.llvm.VARIABLE] = "no library"
+module, _, name = "{question}".rpartition(".")
+try:
+    getattr(importlib.import_module(module), name)()
+except tracer.MachineError as error:
+    print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", program], text=True, cwd=repository, timeout=120)
+    assert done.returncode == 0
+
+
 def test_an_old_library_taken_before_tracer_came_is_named(repository: Path) -> None:
     # The variable is gone again when tracer looks, so that a newer library is there, but not in use.
     before = "import os, drjit; del os.environ['DRJIT_LIBLLVM_PATH']"
