@@ -57,10 +57,20 @@ def pixel_tree(
     return PixelTree(scene.name, x, y, n, scene.color_space == "linear", types.precision, tuple(roots))
 
 
+LANES = 64
+"""Rays of a level come in multiples of so many lanes, the last ray repeated: which kernels Dr.Jit makes of
+the code depends on which arrays are of one length, and on which hold a single number."""
+
+
+def lanes_for(rays: int) -> int:
+    """The lanes of a level of so many rays."""
+    return -(-rays // LANES) * LANES
+
+
 @dataclass
 class _Level:
-    """The rays of one level: `paths`, the numbers of their sub-rays, and for each its kind, its factor and
-    the list of nodes that it belongs to."""
+    """The rays of one level: `paths` and the numbers of their sub-rays, by lane, and for each ray its kind,
+    its factor and the list of nodes that it belongs to."""
 
     paths: Any
     sub_rays: np.ndarray
@@ -81,16 +91,18 @@ class _Lens:
     def look(self, canvas: DeviceCanvas, x: int, y: int, number: int, n: int) -> list[RayNode]:
         """The trees of the pixel's sub-rays."""
         backend, count = self.backend, n * n
-        lane = dr.arange(backend.UInt32, count)
-        column, row, numbers = (dr.opaque(backend.UInt32, value, count) for value in (x, y, number))
+        width = lanes_for(count)
+        sub_rays = np.minimum(np.arange(width), count - 1)
+        lane = backend.id_table(sub_rays)
+        column, row, numbers = (dr.opaque(backend.UInt32, value, width) for value in (x, y, number))
         self.pixel = number
-        active = dr.full(backend.Bool, True, count)
+        active = dr.full(backend.Bool, True, width)
         pixels = PixelGrid(lane, backend.opaque_id(count), column, row, numbers, backend.opaque_id(n), active)
         self.share = 1 / count
         roots: list[RayNode] = []
         level: _Level | None = _Level(
             primary_path(self.device, canvas, pixels, lane),
-            np.arange(count),
+            sub_rays,
             ["primary"] * count,
             [1.0] * count,
             [roots] * count,
@@ -102,7 +114,8 @@ class _Lens:
     def _trace(self, level: _Level) -> _Level | None:
         """Adds the nodes of a level, and gives the next one."""
         device, backend, path = self.device, self.backend, level.paths
-        everything = dr.full(backend.Bool, True, len(level.kinds))
+        width, rays = len(level.sub_rays), len(level.kinds)
+        everything = dr.full(backend.Bool, True, width)
         hit = closest_hit(device, path.ray, everything)
         surface = surface_at(device, path.ray, hit, everything)
         material = material_at(device, surface, hit.valid)
@@ -112,11 +125,11 @@ class _Lens:
         base = path.throughput * own * device.not_ambient
         children = spawn(device, path, surface, material, base, hit.valid)
         dr.eval(hit, surface, material, own, children)
-        number = dr.opaque(backend.UInt32, self.pixel, len(level.kinds))
-        sub_ray = backend.UInt32(level.sub_rays)
-        lights = self.lights.terms(path, surface, material, hit.valid, number, sub_ray)
-        seen = _Columns(len(level.kinds), path, hit, surface, material, own, children)
-        nodes = [self._node(level, seen, i, lights[i]) for i in range(len(level.kinds))]
+        number = dr.opaque(backend.UInt32, self.pixel, width)
+        sub_ray = backend.id_table(level.sub_rays)
+        lights = self.lights.terms(rays, path, surface, material, hit.valid, number, sub_ray)
+        seen = _Columns(width, path, hit, surface, material, own, children)
+        nodes = [self._node(level, seen, i, lights[i]) for i in range(rays)]
         for home, node in zip(level.homes, nodes, strict=True):
             home.append(node)
         return self._next(level, nodes, children, seen)
@@ -195,19 +208,21 @@ class _Lens:
         ]
         if not rows:
             return None
-        lanes = np.array([i for i, _ in rows])
-        mirrored = np.array([is_mirrored for _, is_mirrored in rows])
-        index = self.backend.UInt32(lanes)
+        in_lanes = np.minimum(np.arange(lanes_for(len(rows))), len(rows) - 1)
+        parents = np.array([i for i, _ in rows])
+        lanes = parents[in_lanes]
+        mirrored = np.array([is_mirrored for _, is_mirrored in rows])[in_lanes]
+        index = self.backend.id_table(lanes)
         first, second = (picked(path, index) for path in (children.reflected, children.refracted))
-        paths = dr.select(self.backend.Bool(mirrored), first, second)
+        paths = dr.select(self.backend.id_table(mirrored) != 0, first, second)
         dr.eval(paths)
-        second_kinds = ["total_reflection" if seen.total[i] else "refracted" for i in lanes]
+        second_kinds = ["total_reflection" if seen.total[i] else "refracted" for i in parents]
         return _Level(
             paths,
             level.sub_rays[lanes],
-            ["reflected" if one else other for one, other in zip(mirrored, second_kinds, strict=True)],
+            ["reflected" if one else other for (_, one), other in zip(rows, second_kinds, strict=True)],
             [float((seen.reflection if one else seen.refraction)[i]) for i, one in rows],
-            [nodes[i].children for i in lanes],
+            [nodes[i].children for i in parents],
         )
 
 

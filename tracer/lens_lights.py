@@ -31,15 +31,22 @@ class LightsUnderTheLens:
         self._owners = device.lights.lights.numpy()[: self._samples]
 
     def terms(
-        self, path: Any, surface: Surface, material: MaterialRow, found: Any, pixel: Any, sub_ray: Any
+        self,
+        rays: int,
+        path: Any,
+        surface: Surface,
+        material: MaterialRow,
+        found: Any,
+        pixel: Any,
+        sub_ray: Any,
     ) -> list[tuple[LightTerm, ...]]:
-        """The terms of all lights at each hit; every pair of a hit and a sample has a lane. `pixel` and
-        `sub_ray` (n,): the numbers by which lights jitter."""
+        """The terms of all lights at the hits of the first `rays` lanes; every pair of a hit and a sample has
+        a lane. `pixel` and `sub_ray` (n,): the numbers by which lights jitter."""
         count, samples = len(sub_ray), self._samples
         if samples == 0:
-            return [()] * count
-        index = self._device.backend.UInt32
-        of_ray, i = index(np.repeat(np.arange(count), samples)), index(np.tile(np.arange(samples), count))
+            return [()] * rays
+        upload = self._device.backend.id_table
+        of_ray, i = upload(np.repeat(np.arange(count), samples)), upload(np.tile(np.arange(samples), count))
         hits = (path, surface, material.finish.shininess, found, pixel, sub_ray)
         arrived = self._arrivals(picked(hits, of_ray), i)
         shape = (count, samples)
@@ -53,7 +60,7 @@ class LightsUnderTheLens:
                 for light in dict.fromkeys(self._owners.tolist())
                 for own in [np.flatnonzero(self._owners == light)]
             )
-            for ray in range(count)
+            for ray in range(rays)
         ]
 
     def _term(
