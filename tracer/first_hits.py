@@ -11,14 +11,17 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from tracer.acceleration.bundles import DOUBTFUL, RAYS, answers_to, in_order
-from tracer.acceleration.first_of_bundles import Bundles, nearest_of_bundles
+from tracer.acceleration.bundles import DOUBTFUL, RAYS, Found, answers_to
+from tracer.acceleration.first_of_bundles import HELD, Bundles, nearest_of_bundles
+from tracer.acceleration.traverse import visit_some
 from tracer.acceleration.triangle import TriangleTables
+from tracer.backends import INVALID
 from tracer.canvas import Canvas, DeviceCanvas
 from tracer.device_scene import DeviceScene
 from tracer.first_shadows import first_shadows
-from tracer.intersection import closest_triangle, free_ray
+from tracer.intersection import closest_triangle, departure, free_ray, known_triangle, slot_of
 from tracer.pixels import Lanes, numbered_rays
+from tracer.ray import Hit, Ray, keep_nearer, no_hit, select_min
 from tracer.replay import Program
 
 FEWEST_RAYS = 1 << 18
@@ -36,10 +39,10 @@ they save."""
 @dataclass
 class FirstHits:
     """What primary rays meet, of all lanes for their first sub-ray, then for the next (lanes n n,): the
-    `primitive` that is first among triangles (`INVALID`: none, `DOUBTFUL`: the loop has to find it), and
+    `slot` of the triangle that is first (`INVALID`: none, `DOUBTFUL`: the loop has to find it), and
     where it is `HIDDEN` from the lights of `lights_asked`, a list that is empty where nobody has looked."""
 
-    primitive: Any
+    slot: Any
     hidden: list[Any]
 
 
@@ -57,14 +60,13 @@ def first_hits(
     if rays < FEWEST_RAYS or edge < SMALLEST_EDGE:
         return FirstHits(dr.opaque(index, DOUBTFUL, rays), [])
 
-    def in_bundles(numbers: Any, both: bool) -> tuple[Any, Any]:
-        found = bundled(scene, device_canvas, lanes, numbers, both)
-        return found["primitive"], found["unknown"] == 1
-
-    def single(numbers: Any) -> Any:
-        return singly(scene, device_canvas, lanes, numbers)["primitive"]
-
-    found = answers_to(index, rays, in_bundles, single)
+    found = answers_to(
+        index,
+        rays,
+        lambda numbers, both: Found(**bundled(scene, device_canvas, lanes, numbers, both)),
+        lambda found, places, numbers: among(scene, device_canvas, lanes, found, places, numbers)["slot"],
+        lambda numbers: singly(scene, device_canvas, lanes, numbers)["slot"],
+    )
     if edge < SMALLEST_SHADOW_EDGE or share < SMALLEST_SHARE:
         return FirstHits(found, [])
     return FirstHits(found, first_shadows(scene, device_canvas, lanes, found))
@@ -74,14 +76,47 @@ def first_hits(
 def bundled(
     scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, numbers: Any, both: bool
 ) -> dict[str, Any]:
-    """What the rays of bundles with these numbers meet, and 1 for those that it does not tell; see
-    `nearest_of_bundles`. The rays of a bundle are neighbors, RAYS with consecutive numbers."""
+    """What the rays of bundles with these numbers meet, as in `Found`. The rays of a bundle are neighbors,
+    RAYS with consecutive numbers."""
     assert scene.triangles is not None
     backend = scene.backend
     rays = [numbered_rays(backend, canvas, lanes, numbers * RAYS + k)[1:] for k in range(RAYS)]
-    bundles = Bundles.of(canvas.eye, rays)
-    answers, unknown = nearest_of_bundles(backend, scene.triangles, bundles, both)
-    return {"primitive": in_order(backend, answers), "unknown": dr.select(unknown, backend.UInt32(1), 0)}
+    return vars(nearest_of_bundles(backend, scene.triangles, Bundles.of(canvas.eye, rays), both))
+
+
+@Program
+def among(
+    scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, found: Found, places: Any, numbers: Any
+) -> dict[str, Any]:
+    """What the rays with these numbers meet, as far as their bundles tell; see `nearest_among`."""
+    _, o, d = numbered_rays(scene.backend, canvas, lanes, numbers)
+    return {"slot": nearest_among(scene, free_ray(scene, o, d), found, places)}
+
+
+def nearest_among(scene: DeviceScene, ray: Ray, found: Found, places: Any) -> Any:
+    """The slot of the triangle that rays (n,) meet first, by the answers and candidates in these places of
+    what bundles found; `DOUBTFUL` where these do not tell enough."""
+    assert scene.triangles is not None
+    known = dr.gather(type(places), found.answers, places)
+    answered = known != DOUBTFUL
+    nothing = no_hit(scene.backend, dr.width(places))
+
+    def visit(state: Any, t: Any, primitive: Any, _test: Any, valid: Any) -> Any:
+        hit, hoped = state
+        return keep_nearer(hit, t, valid, primitive), select_min(dr.select(t > 0, t, hoped), hoped)
+
+    hit, hoped = visit_some(
+        scene.backend,
+        scene.triangles,
+        ray,
+        lambda: departure(scene, ray),
+        state=(known_triangle(scene, ray, nothing, answered, known), nothing.t),
+        limit=lambda state: state[0].t,
+        visit=visit,
+        active=answered,
+        fold=lambda test, state: found.fold(places, test, state),
+    )
+    return dr.select(answered & (hit.t <= hoped * HELD), slot_of_hit(scene, hit), DOUBTFUL)
 
 
 @Program
@@ -89,7 +124,12 @@ def singly(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, numbers: Any)
     """What the rays with these numbers meet, each by itself."""
     _, o, d = numbered_rays(scene.backend, canvas, lanes, numbers)
     everything = dr.full(scene.backend.Bool, True, len(numbers))
-    return {"primitive": closest_triangle(scene, free_ray(scene, o, d), everything).primitive}
+    return {"slot": slot_of_hit(scene, closest_triangle(scene, free_ray(scene, o, d), everything))}
+
+
+def slot_of_hit(scene: DeviceScene, hit: Hit) -> Any:
+    """The slot of the triangle that is hit, `INVALID` for none."""
+    return dr.select(hit.valid, slot_of(scene, hit.primitive, hit.valid), INVALID)
 
 
 def _appearance(triangles: TriangleTables, canvas: Canvas) -> tuple[float, float]:

@@ -6,12 +6,14 @@ shapes hide, and about points that other rays meet.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import drjit as dr
 
-from tracer.acceleration.bundles import answers_to, in_order, neighboring_points, neighbors
+from tracer.acceleration.bundles import DOUBTFUL, Found, answers_to, neighboring_points, neighbors
 from tracer.acceleration.shadows_of_bundles import HIDDEN, LIT, LitPoints, certain_reach, hidden_points
+from tracer.acceleration.traverse import Fold
 from tracer.arrival import segment_to
 from tracer.canvas import DeviceCanvas
 from tracer.device_scene import DeviceScene
@@ -35,23 +37,23 @@ def lights_asked(scene: DeviceScene) -> list[UnrolledLight]:
     return [light for light in scene.lights.unrolled if len(light.samples) == 1][:MOST_LIGHTS]
 
 
-def first_shadows(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, primitives: Any) -> list[Any]:
+def first_shadows(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, slots: Any) -> list[Any]:
     """For each of `lights_asked` and every primary ray of a launch (lanes n n,), `HIDDEN` where triangles
-    hide the light from the point that it meets first. `primitives`: the triangles that they meet."""
+    hide the light from the point that it meets first. `slots`: of the triangles that they meet."""
     lights = lights_asked(scene)
     if not lights:
         return []
-    points = lit_points(scene, canvas, lanes, primitives)
+    points = lit_points(scene, canvas, lanes, slots)
 
     def hidden_from(sample: LightSample, where: list[Any]) -> Any:
-        def in_bundles(numbers: Any, both: bool) -> tuple[Any, Any]:
-            found = bundled(scene, sample.position, where, numbers, both)
-            return found["hidden"], found["unknown"] == 1
-
-        def single(numbers: Any) -> Any:
-            return singly(scene, canvas, lanes, primitives, sample, numbers)["hidden"]
-
-        return answers_to(scene.backend.UInt32, len(primitives), in_bundles, single)
+        asked = scene, canvas, lanes, slots, sample
+        return answers_to(
+            scene.backend.UInt32,
+            len(slots),
+            lambda numbers, both: Found(**bundled(scene, sample.position, where, numbers, both)),
+            lambda found, places, numbers: among(*asked, found, places, numbers)["hidden"],
+            lambda numbers: singly(*asked, numbers)["hidden"],
+        )
 
     return [
         hidden_from(
@@ -62,13 +64,13 @@ def first_shadows(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, primit
 
 
 @Program
-def lit_points(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, primitives: Any) -> dict[str, Any]:
+def lit_points(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, slots: Any) -> dict[str, Any]:
     """What all rays of a launch meet: the point `x`, `y`, `z` and its `primitive`, and for each light how far
     it reaches (see `LitPoints`)."""
     assert scene.triangles is not None
     backend = scene.backend
-    number = dr.arange(backend.UInt32, len(primitives))
-    ray, surface, found = _first_surface(scene, canvas, lanes, number, primitives)
+    number = dr.arange(backend.UInt32, len(slots))
+    ray, surface, found = _first_surface(scene, canvas, lanes, number, slots)
     values = {"x": surface.p.x, "y": surface.p.y, "z": surface.p.z, "primitive": surface.primitive}
     for k, light in enumerate(lights_asked(scene)):
         faces = found & may_be_lit(backend, surface, light.ball)
@@ -82,8 +84,7 @@ def lit_points(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, primitive
 
 @Program
 def bundled(scene: DeviceScene, light: Any, where: list[Any], numbers: Any, both: bool) -> dict[str, Any]:
-    """Whether triangles hide a light (3, 1) from the points of bundles with these numbers, and 1 for those
-    that it does not tell; see `hidden_points`."""
+    """Whether triangles hide a light (3, 1) from the points of bundles with these numbers, as in `Found`."""
     assert scene.triangles is not None
     backend = scene.backend
     *place, primitives, reach = where
@@ -92,8 +93,26 @@ def bundled(scene: DeviceScene, light: Any, where: list[Any], numbers: Any, both
         points=lambda: neighboring_points(backend, place, numbers),
         primitives=lambda: neighbors(backend, primitives, numbers),
     )
-    answers, unknown = hidden_points(backend, scene.triangles, light, bundles, both)
-    return {"hidden": in_order(backend, answers), "unknown": dr.select(unknown, backend.UInt32(1), 0)}
+    return vars(hidden_points(backend, scene.triangles, light, bundles, both))
+
+
+@Program
+def among(
+    scene: DeviceScene,
+    canvas: DeviceCanvas,
+    lanes: Lanes,
+    slots: Any,
+    sample: LightSample,
+    found: Found,
+    places: Any,
+    numbers: Any,
+) -> dict[str, Any]:
+    """The same for the rays with these numbers by the candidates in these places of what bundles found, and
+    `DOUBTFUL` where they do not tell."""
+    asked = dr.gather(type(places), found.answers, places) != DOUBTFUL
+    blocked = _blocked(scene, canvas, lanes, slots, sample, numbers, asked, partial(found.fold, places))
+    hidden = dr.select(blocked, scene.backend.UInt32(HIDDEN), LIT)
+    return {"hidden": dr.select(asked, hidden, DOUBTFUL)}
 
 
 @Program
@@ -101,17 +120,31 @@ def singly(
     scene: DeviceScene,
     canvas: DeviceCanvas,
     lanes: Lanes,
-    primitives: Any,
+    slots: Any,
     sample: LightSample,
     numbers: Any,
 ) -> dict[str, Any]:
     """The same for the rays with these numbers, each by itself."""
-    backend = scene.backend
-    known = dr.gather(backend.UInt32, primitives, numbers)
+    everything = dr.full(scene.backend.Bool, True, len(numbers))
+    blocked = _blocked(scene, canvas, lanes, slots, sample, numbers, everything)
+    return {"hidden": dr.select(blocked, scene.backend.UInt32(HIDDEN), LIT)}
+
+
+def _blocked(
+    scene: DeviceScene,
+    canvas: DeviceCanvas,
+    lanes: Lanes,
+    slots: Any,
+    sample: LightSample,
+    numbers: Any,
+    active: Any,
+    fold: Fold | None = None,
+) -> Any:
+    """Mask: a triangle, of all or of some (`visit_some`), hides the light from what rays meet first."""
+    known = dr.gather(scene.backend.UInt32, slots, numbers)
     ray, surface, found = _first_surface(scene, canvas, lanes, numbers, known)
-    blocked = dr.full(backend.Bool, False, len(numbers))
-    blocked = hidden_by_triangle(scene, segment_to(ray, surface, sample), surface, blocked, found)
-    return {"hidden": dr.select(blocked, backend.UInt32(HIDDEN), LIT)}
+    blocked = dr.full(scene.backend.Bool, False, len(numbers))
+    return hidden_by_triangle(scene, segment_to(ray, surface, sample), surface, blocked, active & found, fold)
 
 
 def _first_surface(
@@ -119,13 +152,13 @@ def _first_surface(
     canvas: DeviceCanvas,
     lanes: Lanes,
     number: Any,
-    primitive: Any,
+    slot: Any,
 ) -> tuple[Ray, Surface, Any]:
     """Rays by number, what they meet first, and mask: they meet something."""
     pixels, o, d = numbered_rays(scene.backend, canvas, lanes, number)
     ray = free_ray(scene, o, d)
     everything = dr.full(scene.backend.Bool, True, dr.width(number))
-    hit = closest_hit(scene, ray, pixels.active, known=Known(everything, primitive))
+    hit = closest_hit(scene, ray, pixels.active, known=Known(everything, slot))
     return ray, surface_at(scene, ray, hit, pixels.active), pixels.active & hit.valid
 
 

@@ -13,7 +13,7 @@ import drjit as dr
 
 from tracer.acceleration.departure import Departure, Ground
 from tracer.acceleration.traverse import distance_to, visit_triangles
-from tracer.acceleration.triangle import gather_triangle
+from tracer.acceleration.triangle import fetch_triangle, gather_triangle
 from tracer.backends import INVALID
 from tracer.branches import changed_where
 from tracer.device_scene import KIND_UNIT, MESH, PLANE, SPHERE, DeviceScene
@@ -76,10 +76,10 @@ def plane_sides(scene: DeviceScene, o: Any, d: Any) -> Any:
 @dataclass
 class Known:
     """What is known of rays before they are traced: `mask` (n,) of those whose nearest triangle is, and its
-    `primitive` (n,), `INVALID` for none."""
+    `slot` (n,) in the hierarchy, `INVALID` for none."""
 
     mask: Any
-    primitive: Any
+    slot: Any
 
 
 def closest_hit(
@@ -96,7 +96,7 @@ def closest_hit(
         hit = scene.sphere_table.closest(ray, hit, active)
     if scene.triangles is not None:
         if known is not None:
-            hit = known_triangle(scene, ray, hit, active & known.mask, known.primitive)
+            hit = known_triangle(scene, ray, hit, active & known.mask, known.slot)
             active = active & ~known.mask
         hit = _closest_triangle(scene, ray, hit, active)
     return hit
@@ -122,16 +122,16 @@ def _closest_triangle(scene: DeviceScene, ray: Ray, hit: Hit, active: Any) -> Hi
     )
 
 
-def known_triangle(scene: DeviceScene, ray: Ray, hit: Hit, active: Any, primitive: Any) -> Hit:
-    """The nearer of a hit and of that on a triangle that the ray is known to meet."""
+def known_triangle(scene: DeviceScene, ray: Ray, hit: Hit, active: Any, slot: Any) -> Hit:
+    """The nearer of a hit and of that on the triangle in a slot, which the ray is known to meet."""
     assert scene.triangles is not None
     backend, tables = scene.backend, scene.triangles
 
     def meet(hit: Hit) -> Hit:
-        triangle = gather_triangle(backend, tables.rows, _slot(scene, primitive, True))
+        triangle, primitive = fetch_triangle(backend, tables.rows, slot)
         return keep_nearer(hit, distance_to(backend, tables.lists, ray, triangle), True, primitive)
 
-    found: Hit = changed_where(active & (primitive != INVALID), hit, meet, label="known triangle")
+    found: Hit = changed_where(active & (slot != INVALID), hit, meet, label="known triangle")
     return found
 
 
@@ -178,7 +178,7 @@ def _geometry_at(
         tables = scene.triangles.rows
 
         def on_triangle(point: Any, normal: Any) -> tuple[Any, Any]:
-            triangle = gather_triangle(backend, tables, _slot(scene, primitive, True))
+            triangle = gather_triangle(backend, tables, slot_of(scene, primitive, True))
             height = dr.dot(triangle.normal, p - triangle.v0)
             return dr.fma(-height, triangle.normal, p), triangle.normal
 
@@ -192,7 +192,8 @@ def _geometry_at(
     return point, normal
 
 
-def _slot(scene: DeviceScene, primitive: Any, active: Any) -> Any:
+def slot_of(scene: DeviceScene, primitive: Any, active: Any) -> Any:
+    """Where a triangle stands in the hierarchy."""
     return dr.gather(scene.backend.UInt32, scene.slot_of, primitive, active)
 
 
@@ -213,7 +214,7 @@ def _smooth_normal(
     triangles, vertex_normals = scene.triangles.rows, scene.smooth.normals
 
     def interpolated(lit_side: Any) -> Any:
-        slot = _slot(scene, primitive, True)
+        slot = slot_of(scene, primitive, True)
         triangle = gather_triangle(backend, triangles, slot)
         normals = gather_triangle(backend, vertex_normals, slot)
         b1, b2 = barycentrics(triangle.v0, triangle.v1, triangle.v2, p)
@@ -241,7 +242,7 @@ def departure(scene: DeviceScene, ray: Ray) -> Departure:
     kind, row = _left(scene, ray, active)
     assert scene.triangles is not None
     is_mesh = active & (kind == MESH)
-    slot = _slot(scene, ray.departure >> 1, is_mesh)
+    slot = slot_of(scene, ray.departure >> 1, is_mesh)
     end = dr.gather(backend.Vector4, scene.triangles.rows, slot * 4 + 2, is_mesh)
     center = backend.Vector3(row.x, row.y, row.z)
     outward = dr.select(kind == SPHERE, normalize(ray.o - center), center)
@@ -268,7 +269,7 @@ def _ground(scene: DeviceScene, ray: Ray, active: Any) -> Ground:
     kind, row = _left(scene, ray, active)
     assert scene.triangles is not None
     is_mesh = active & (kind == MESH)
-    triangle = gather_triangle(backend, scene.triangles.rows, _slot(scene, ray.departure >> 1, is_mesh))
+    triangle = gather_triangle(backend, scene.triangles.rows, slot_of(scene, ray.departure >> 1, is_mesh))
     center = backend.Vector3(row.x, row.y, row.z)
     return Ground(
         corners=tuple(dr.select(is_mesh, v, center) for v in (triangle.v0, triangle.v1, triangle.v2)),

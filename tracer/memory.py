@@ -26,8 +26,8 @@ UNKNOWN_PROCESS = 320 << 20
 FILTER_BYTES = 100
 """A pixel, of the depth-of-field filter: colors and depths in double precision, pixels sorted by depth."""
 
-FIRST_TRIANGLE = 12
-"""Bytes of a primary ray, of the search for its first triangle."""
+FIRST_TRIANGLE = 16
+"""Bytes of a primary ray, of the search for its first triangle in bundles."""
 
 
 LISTED_BYTES = 24

@@ -199,8 +199,8 @@ def _known_triangle(backend: Backend, first: FirstHits | None, number: Any, is_p
     """What is known of the hits of primary rays; `number`: that of a ray among all of its launch."""
     if first is None:
         return None
-    primitive = dr.gather(backend.UInt32, first.primitive, number, is_primary)
-    return Known(is_primary & (primitive != DOUBTFUL), primitive)
+    slot = dr.gather(backend.UInt32, first.slot, number, is_primary)
+    return Known(is_primary & (slot != DOUBTFUL), slot)
 
 
 def _known_shadows(backend: Backend, first: FirstHits | None, number: Any, is_primary: Any) -> Shadows | None:

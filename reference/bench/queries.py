@@ -8,6 +8,7 @@ the kernels, as Dr.Jit's history has it; that of Python, which records them, is 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -17,6 +18,7 @@ import tracer
 from reference.bench.frames import Check
 from reference.bench.rays import EYE, KINDS, LIGHT, Rays, primary, secondary
 from reference.bench.records import Rate, Series
+from tracer.acceleration.traverse import Fold, visit_some, visit_triangles
 from tracer.backends import INVALID, Backend, exact_arithmetic, find_backend
 from tracer.device_scene import compile_scene
 from tracer.intersection import closest_hit, free_ray
@@ -113,23 +115,33 @@ class Ours:
 def closest_of_neighbors(device: Any, o: Any, d: Any, eye: Any, active: Any) -> Any:
     """Closest hits of rays that start in one eye, as the renderer finds those of its primary rays: in
     bundles."""
-    from tracer.acceleration.bundles import RAYS, answers_to, in_order, neighboring_points
+    from tracer.acceleration.bundles import RAYS, Found, answers_to, neighboring_points
     from tracer.acceleration.first_of_bundles import Bundles, nearest_of_bundles
+    from tracer.first_hits import nearest_among, slot_of_hit
     from tracer.intersection import closest_triangle, known_triangle
 
     backend = device.backend
 
-    def in_bundles(bundle: Any, both: bool) -> tuple[Any, Any]:
+    def rays(numbers: Any) -> Ray:
+        return free_ray(device, dr.gather(type(o), o, numbers), dr.gather(type(d), d, numbers))
+
+    def in_bundles(bundle: Any, both: bool) -> Found:
         starts = [dr.zeros(backend.Float, dr.width(bundle))] * RAYS
         bundles = Bundles(eye, neighboring_points(backend, d, bundle), starts)
-        found, unknown = nearest_of_bundles(backend, device.triangles, bundles, both)
-        return in_order(backend, found), unknown
+        found = nearest_of_bundles(backend, device.triangles, bundles, both)
+        dr.eval(found)
+        return found
+
+    def among(found: Found, places: Any, numbers: Any) -> Any:
+        answers = nearest_among(device, rays(numbers), found, places)
+        dr.eval(answers)
+        return answers
 
     def singly(numbers: Any) -> Any:
-        ray = free_ray(device, dr.gather(type(o), o, numbers), dr.gather(type(d), d, numbers))
-        return closest_triangle(device, ray, dr.full(backend.Bool, True, len(numbers))).primitive
+        everything = dr.full(backend.Bool, True, len(numbers))
+        return slot_of_hit(device, closest_triangle(device, rays(numbers), everything))
 
-    first = answers_to(backend.UInt32, dr.width(d), in_bundles, singly)
+    first = answers_to(backend.UInt32, dr.width(d), in_bundles, among, singly)
     nothing = no_hit(backend, dr.width(d))
     return known_triangle(device, free_ray(device, o, d), nothing, active, first)
 
@@ -137,7 +149,7 @@ def closest_of_neighbors(device: Any, o: Any, d: Any, eye: Any, active: Any) -> 
 def hidden_neighbors(device: Any, o: Any, light: Any) -> Any:
     """Mask: some triangle lies between points and a light, as the renderer finds it where primary rays hit:
     in bundles from the light."""
-    from tracer.acceleration.bundles import RAYS, answers_to, in_order, neighboring_points
+    from tracer.acceleration.bundles import DOUBTFUL, RAYS, Found, answers_to, neighboring_points
     from tracer.acceleration.shadows_of_bundles import HIDDEN, LIT, LitPoints, hidden_points
 
     backend = device.backend
@@ -145,40 +157,46 @@ def hidden_neighbors(device: Any, o: Any, light: Any) -> Any:
     def reach(p: Any) -> Any:
         return dr.norm(light - p)
 
-    def in_bundles(bundle: Any, both: bool) -> tuple[Any, Any]:
+    def in_bundles(bundle: Any, both: bool) -> Found:
         points = neighboring_points(backend, o, bundle)
         nothing_left = [backend.UInt32(INVALID)] * RAYS
         bundles = LitPoints([reach(p) for p in points], lambda: points, lambda: nothing_left)
-        hidden, unknown = hidden_points(backend, device.triangles, light, bundles, both)
-        return in_order(backend, hidden), unknown
+        found = hidden_points(backend, device.triangles, light, bundles, both)
+        dr.eval(found)
+        return found
 
-    def singly(numbers: Any) -> Any:
+    def blocked(numbers: Any, active: Any, fold: Fold | None = None) -> Any:
         p = dr.gather(type(o), o, numbers)
         length = reach(p)
         ray = free_ray(device, p, (light - p) / length)
-        everything = dr.full(backend.Bool, True, dr.width(numbers))
-        return dr.select(any_triangle(device, ray, length, everything), backend.UInt32(HIDDEN), LIT)
+        return dr.select(any_triangle(device, ray, length, active, fold), backend.UInt32(HIDDEN), LIT)
 
-    return answers_to(backend.UInt32, dr.width(o), in_bundles, singly) == HIDDEN
+    def among(found: Found, places: Any, numbers: Any) -> Any:
+        asked = dr.gather(type(places), found.answers, places) != DOUBTFUL
+        answers = dr.select(asked, blocked(numbers, asked, partial(found.fold, places)), DOUBTFUL)
+        dr.eval(answers)
+        return answers
+
+    def singly(numbers: Any) -> Any:
+        return blocked(numbers, dr.full(backend.Bool, True, dr.width(numbers)))
+
+    return answers_to(backend.UInt32, dr.width(o), in_bundles, among, singly) == HIDDEN
 
 
-def any_triangle(device: Any, ray: Ray, length: Any, active: Any) -> Any:
-    """Mask: some triangle is hit before `length`; the walk ends with the first."""
-    from tracer.acceleration.traverse import visit_triangles
+def any_triangle(device: Any, ray: Ray, length: Any, active: Any, fold: Fold | None = None) -> Any:
+    """Mask: some triangle is hit before `length`; the walk ends with the first. `fold`: see `visit_some`."""
     from tracer.intersection import departure
 
-    backend = device.backend
-    return visit_triangles(
-        backend,
-        device.triangles,
-        ray,
-        lambda: departure(device, ray),
-        state=dr.full(backend.Bool, False, dr.width(ray.d)),
-        limit=lambda blocked: length,
-        visit=lambda blocked, _t, _primitive, _test, valid: blocked | valid,
-        active=active,
-        done=lambda blocked: blocked,
-    )
+    asked = {
+        "departure": lambda: departure(device, ray),
+        "state": dr.full(device.backend.Bool, False, dr.width(ray.d)),
+        "limit": lambda blocked: length,
+        "visit": lambda blocked, _t, _primitive, _test, valid: blocked | valid,
+        "active": active,
+    }
+    if fold is not None:
+        return visit_some(device.backend, device.triangles, ray, fold=fold, **asked)
+    return visit_triangles(device.backend, device.triangles, ray, done=lambda blocked: blocked, **asked)
 
 
 class Embree:

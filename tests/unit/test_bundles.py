@@ -15,13 +15,16 @@ from tests.accuracy import worlds
 from tests.accuracy.worlds import icosphere
 from tests.unit.test_hierarchy import pile, scene_of, single, slivers, soup
 from tracer import first_hits
-from tracer.acceleration import first_of_bundles
+from tracer.acceleration import bundles as bundles_module
+from tracer.acceleration import candidates, first_of_bundles
 from tracer.acceleration.bundles import DOUBTFUL, RAYS
 from tracer.acceleration.first_of_bundles import Bundles, nearest_of_bundles
+from tracer.acceleration.triangle import TRIANGLE_WORDS
 from tracer.backends import Backend, exact_arithmetic, find_backend
 from tracer.camera import Camera
 from tracer.canvas import Canvas, DeviceCanvas
 from tracer.device_scene import DeviceScene, compile_scene
+from tracer.first_hits import nearest_among
 from tracer.intersection import closest_triangle, free_ray
 
 Array = np.ndarray
@@ -94,21 +97,33 @@ def picture_rays(backend: Backend, canvas: Canvas) -> tuple[DeviceCanvas, Callab
     return device, ray_of
 
 
-def both_ways(device: DeviceScene, canvas: Canvas, both: bool = False) -> tuple[Array, Array]:
-    """Primitives by bundles, and ray by ray; `both`: by the kernel for directions of both signs."""
+def both_ways(device: DeviceScene, canvas: Canvas, both: bool = False) -> tuple[Array, Array, Array]:
+    """Primitives by bundles alone, by bundles and the candidates that they note (`DOUBTFUL`: neither tells),
+    and ray by ray; `both`: by the kernel for directions of both signs."""
     backend = device.backend
     assert device.triangles is not None
     with exact_arithmetic():
         on_device, ray_of = picture_rays(backend, canvas)
         bundle = dr.arange(backend.UInt32, PIXELS**2 // RAYS)
-        rays = [ray_of(bundle * RAYS + k) for k in range(RAYS)]
-        bundles = Bundles.of(on_device.eye, rays)
-        found, unknown = nearest_of_bundles(backend, device.triangles, bundles, both)
-        dr.eval(found, unknown)
-        assert not (both and unknown.numpy().any())
-        o, d = ray_of(dr.arange(backend.UInt32, PIXELS**2))
-        singly = closest_triangle(device, free_ray(device, o, d), dr.full(backend.Bool, True, PIXELS**2))
-        return np.stack([p.numpy() for p in found], axis=1).ravel(), singly.primitive.numpy()
+        bundles = Bundles.of(on_device.eye, [ray_of(bundle * RAYS + k) for k in range(RAYS)])
+        found = nearest_of_bundles(backend, device.triangles, bundles, both)
+        dr.eval(found)
+        assert not (both and found.unknown.numpy().any())
+        places = dr.arange(backend.UInt32, PIXELS**2)
+        ray = free_ray(device, *ray_of(places))
+        is_open = found.is_open(places)
+        certain = dr.select(is_open, DOUBTFUL, found.answers)
+        settled = dr.select(is_open, nearest_among(device, ray, found, places), found.answers)
+        dr.eval(certain, settled)
+        singly = closest_triangle(device, ray, dr.full(backend.Bool, True, PIXELS**2)).primitive.numpy()
+    primitive_of = device.triangles.rows.numpy().reshape(-1, TRIANGLE_WORDS)[:, 12:14] @ [65536, 1]
+    return primitives(primitive_of, certain.numpy()), primitives(primitive_of, settled.numpy()), singly
+
+
+def primitives(primitive_of: Array, slots: Array) -> Array:
+    """Those in slots of the hierarchy; what is no slot stays."""
+    is_slot = slots < len(primitive_of)
+    return np.where(is_slot, primitive_of[np.where(is_slot, slots, 0)], slots)
 
 
 def compare(name: str, precision: str) -> None:
@@ -116,9 +131,10 @@ def compare(name: str, precision: str) -> None:
     device = compile_scene(scene_of(corners), find_backend("llvm", precision))
     for number, canvas in enumerate(cameras(corners)):
         for both in (False, True):
-            found, singly = both_ways(device, canvas, both)
-            wrong = (found != DOUBTFUL) & (found != singly)
-            assert not wrong.any(), f"camera {number}, {both}: {int(wrong.sum())} of {wrong.size}"
+            *ways, singly = both_ways(device, canvas, both)
+            for way, found in zip(("certain", "candidates"), ways, strict=True):
+                wrong = (found != DOUBTFUL) & (found != singly)
+                assert not wrong.any(), f"camera {number}, {both}, {way}: {int(wrong.sum())} of {wrong.size}"
 
 
 @pytest.mark.parametrize("precision", ["single", "double"])
@@ -146,7 +162,7 @@ def test_few_rays_are_doubtful(precision: str, most: float) -> None:
     one_sign = np.repeat((d == d[..., :1]).all(axis=(0, 2)), RAYS)
     assert 0.7 < one_sign.mean() < 0.99
     for both in (False, True):
-        found, singly = both_ways(device, canvas, both)
+        found, _, singly = both_ways(device, canvas, both)
         assert (singly < len(corners)).mean() > 0.2
         assert (found[one_sign] == DOUBTFUL).mean() < most
         assert (found[~one_sign] == DOUBTFUL).mean() < most if both else (found[~one_sign] == DOUBTFUL).all()
@@ -156,9 +172,30 @@ def test_bundles_that_meet_too_many_triangles_are_given_up(monkeypatch: pytest.M
     monkeypatch.setattr(first_of_bundles, "MOST_TRIANGLES", 2)
     corners = SOUPS["fine soup"]()
     device = compile_scene(scene_of(corners), find_backend("llvm"))
-    found, singly = both_ways(device, cameras(corners)[0])
+    _, found, singly = both_ways(device, cameras(corners)[0])
     assert (found == DOUBTFUL).mean() > 0.3
     assert ((found == DOUBTFUL) | (found == singly)).all()
+
+
+def test_candidates_decide_unless_there_are_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    corners = SOUPS["shells"]()
+    device = compile_scene(scene_of(corners), find_backend("llvm"))
+    canvas = cameras(corners)[0]
+    certain, settled, _ = both_ways(device, canvas, both=True)
+    assert (certain == DOUBTFUL).mean() > 2 * (settled == DOUBTFUL).mean()
+    for module in (candidates, bundles_module):
+        monkeypatch.setattr(module, "MOST", 1)
+    certain, settled, singly = both_ways(device, canvas, both=True)
+    assert (certain == DOUBTFUL).mean() == (settled == DOUBTFUL).mean()
+    assert ((settled == DOUBTFUL) | (settled == singly)).all()
+
+
+def test_hopes_that_did_not_hold_are_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Behind a triangle that a ray just misses lies what the bundle has left out."""
+    monkeypatch.setattr(first_hits, "HELD", 1e9)
+    with pytest.raises(AssertionError, match="candidates"):
+        for name in SOUPS:
+            compare(name, "single")
 
 
 # ---- Pictures ----------------------------------------------------------------------------------------------

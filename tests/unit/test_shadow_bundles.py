@@ -14,7 +14,7 @@ from tests.unit.test_bundles import PIXELS, SOUPS, cameras
 from tests.unit.test_hierarchy import scene_of
 from tracer import first_hits, first_shadows
 from tracer.acceleration import shadows_of_bundles
-from tracer.acceleration.bundles import DOUBTFUL, RAYS
+from tracer.acceleration.bundles import DOUBTFUL, RAYS, Found
 from tracer.acceleration.shadows_of_bundles import HIDDEN, LIT
 from tracer.backends import Backend, exact_arithmetic, find_backend
 from tracer.canvas import Canvas, DeviceCanvas
@@ -37,8 +37,8 @@ def lights(corners: Array) -> Array:
 def answers(
     corners: Array, light: Array, canvas: Canvas, backend: Backend
 ) -> tuple[list[Array], Array, Array]:
-    """By the kernels for bundles of one sign on each axis and of both, ray by ray, and mask of the points
-    that ask."""
+    """By the kernels for bundles of one sign on each axis and of both, without and with candidates; ray by
+    ray; and mask of the points that ask."""
     scene = scene_of(corners)
     floor = {"kind": "plane", "coefficients": [0, 1, 0, -float(corners[..., 1].min())]}
     tree = {
@@ -50,16 +50,21 @@ def answers(
     lanes = BandLanes.of(backend, Band(0, 0, PIXELS, PIXELS), PIXELS, 1)
     numbers = dr.arange(backend.UInt32, lanes.count)
     with exact_arithmetic():
-        primitives = first_hits.singly(device, on_device, lanes, numbers)["primitive"]
-        points = first_shadows.lit_points(device, on_device, lanes, primitives)
+        slots = first_hits.singly(device, on_device, lanes, numbers)["slot"]
+        points = first_shadows.lit_points(device, on_device, lanes, slots)
         where = list(points.values())
         (sample,) = first_shadows.lights_asked(device)[0].samples
         bundles = dr.arange(backend.UInt32, lanes.count // RAYS)
-        found = [
-            first_shadows.bundled(device, sample.position, where, bundles, both)["hidden"].numpy()
-            for both in (False, True)
-        ]
-        alone = first_shadows.singly(device, on_device, lanes, primitives, sample, numbers)["hidden"].numpy()
+        found = []
+        for both in (False, True):
+            by_bundles = Found(**first_shadows.bundled(device, sample.position, where, bundles, both))
+            by_candidates = first_shadows.among(
+                device, on_device, lanes, slots, sample, by_bundles, numbers, numbers
+            )["hidden"]
+            is_open = by_bundles.is_open(numbers)
+            found.append(dr.select(is_open, DOUBTFUL, by_bundles.answers).numpy())
+            found.append(dr.select(is_open, by_candidates, by_bundles.answers).numpy())
+        alone = first_shadows.singly(device, on_device, lanes, slots, sample, numbers)["hidden"].numpy()
     return found, alone, where[-1].numpy() > 0
 
 

@@ -2,17 +2,15 @@
 
 A lane takes sixteen neighboring rays through the hierarchy at once. A box is met when it may be met by any
 direction between theirs, so they share the work of reaching it; and because all run through one point, the
-planes through that point and the edges of a triangle are computed once for all of them. The point is the eye
-(`first_of_bundles.py`) or a light (`shadows_of_bundles.py`).
+planes through that point and the edges of a triangle are computed once for all of them (`bundle_tests.py`).
+The point is the eye (`first_of_bundles.py`) or a light (`shadows_of_bundles.py`).
 
 The answers are those of one ray at a time (`traverse.py`), for a bundle only gives those that are certain:
 edge functions, distances and their order must be clear of a bound on all rounding, that of the other test
-included. Rays that are not (a few in a hundred: they pass close to an edge) are `DOUBTFUL`, and asked singly.
-So are those of bundles that meet too many triangles: where these are much smaller than pixels, neighbors have
-little in common.
-
-Distances are kept as their reciprocals, which are linear in the direction: u = -(n.d)/h for a plane with
-normal n at the height h below the point. No division for each ray.
+included. A few rays in a hundred pass close to an edge; of these the bundle notes which triangles it cannot
+decide about (`candidates.py`), and each is tested against those alone. What still is `DOUBTFUL` is asked
+singly: where that does not tell enough, and all rays of bundles that meet too many triangles, since where
+these are much smaller than pixels, neighbors have little in common.
 """
 
 from __future__ import annotations
@@ -23,36 +21,14 @@ from typing import Any
 
 import drjit as dr
 
-from tracer.acceleration.layout import NodeLists
-from tracer.acceleration.triangle import Triangle
-from tracer.acceleration.walk import Node, octant_of
+from tracer.acceleration.candidates import MOST, Candidates
 from tracer.backends import INVALID, Backend
-from tracer.ray import largest, select_max, select_min, smallest
 
 RAYS = 16
 """Rays of a bundle: 4 x 4 pixels. 8 share less, for meshes of a triangle a pixel or less."""
 
 DOUBTFUL = INVALID - 1
 """In place of an answer: rounding could change it."""
-
-BEHIND = 1 + 2.0**-10
-"""How much farther than a hit a box may be and still matter, as a factor of the distance."""
-
-
-TINY = 2.0**-20
-"""Where directions of a bundle have both signs on an axis, they are taken to reach at least so far to either
-side; a wider bundle is a careful one."""
-
-
-def in_order(backend: Backend, answers: list[Any]) -> Any:
-    """The answers (n,) to each of the RAYS rays of bundles, one after the other (RAYS n,)."""
-    n = dr.width(answers[0])
-    result = dr.empty(type(answers[0]), n * RAYS)
-    for k, answer in enumerate(answers):
-        # In any other mode each starts a kernel of its own, with all of the walk.
-        place = dr.arange(backend.UInt32, n) * RAYS + k
-        dr.scatter(result, answer, place, mode=dr.ReduceMode.Permute)
-    return result
 
 
 def neighbors(backend: Backend, values: Any, bundle: Any) -> list[Any]:
@@ -70,27 +46,117 @@ def neighboring_points(backend: Backend, points: Any, bundle: Any) -> list[Any]:
     return [backend.Vector3(*point) for point in zip(*components, strict=True)]
 
 
-InBundles = Callable[[Any, bool], tuple[Any, Any]]
-"""(numbers (n,) of bundles, kernel for `both` signs: see `Cones`) -> the answers to their rays (RAYS n,),
-mask (n,) of the bundles of which nothing is known."""
+def masks_in_word(backend: Backend, masks: list[Any]) -> Any:
+    """Bit k of a word (n,) is mask k (n,)."""
+    word = backend.UInt32(0)
+    for k, mask in enumerate(masks):
+        word = dr.select(mask, word | (1 << k), word)
+    return word
 
 
-def answers_to(index: Any, rays: int, in_bundles: InBundles, singly: Callable[[Any], Any]) -> Any:
-    """The answers to so many rays by number: in bundles, and where these are `DOUBTFUL` by single rays,
-    `singly(numbers)`. `index`: the type of numbers and answers."""
-    answers, unknown = in_bundles(dr.arange(index, rays // RAYS), False)
-    dr.eval(answers, unknown)
-    numbers = _numbers_where(unknown)
+@dataclass
+class Found:
+    """What n bundles found: the `answers` to their rays (RAYS n,). Those with a bit in `open` (n,) need more:
+    they are `DOUBTFUL`, or depend on the first `noted` (n,) of the bundle's candidates, `slots` and
+    `concerned` (see `Candidates`). `unknown` (n,): 1 for bundles that belong to the kernel for both signs
+    (see `Cones`), else 0; they have no answers."""
+
+    answers: Any
+    open: Any
+    noted: Any
+    slots: Any
+    concerned: Any
+    unknown: Any
+
+    @staticmethod
+    def of(
+        backend: Backend,
+        answers: list[Any],
+        lost: Any,
+        close: Any,
+        noted: Any,
+        candidates: Candidates,
+        unknown: Any,
+    ) -> Found:
+        """From answers by ray of a bundle (n,), none for those with a bit in `lost` (n,); `unknown`: mask."""
+        too_many = noted > MOST
+        lost, noted = lost | dr.select(too_many, close, 0), dr.select(too_many, 0, noted)
+        places = dr.arange(backend.UInt32, dr.width(answers[0])) * RAYS
+        all_answers = dr.empty(backend.UInt32, dr.width(answers[0]) * RAYS)
+        for k, answer in enumerate(answers):
+            known = dr.select((lost >> k) & 1 != 0, DOUBTFUL, answer)
+            # In any other mode each starts a kernel of its own, with all of the walk.
+            dr.scatter(all_answers, known, places + k, mode=dr.ReduceMode.Permute)
+        return Found(
+            answers=all_answers,
+            open=dr.select(unknown, 0, close | lost),
+            noted=noted,
+            slots=candidates.slots,
+            concerned=candidates.concerned,
+            unknown=dr.select(unknown, backend.UInt32(1), 0),
+        )
+
+    def open_places(self) -> Any:
+        """The places (k,) of rays that need more than their bundle, padded like `_numbers_where`."""
+        bundles = _numbers_where(self.open != 0)
+        if len(bundles) == 0:
+            return bundles
+        index = type(bundles)
+
+        def place(number: Any) -> Any:
+            return dr.gather(index, bundles, number // RAYS) * RAYS + number % RAYS
+
+        chosen = _numbers_where(self.is_open(place(dr.arange(index, len(bundles) * RAYS))))
+        return place(chosen)
+
+    def is_open(self, places: Any) -> Any:
+        """Mask (k,): the rays in these places need more."""
+        return (dr.gather(type(places), self.open, places // RAYS) >> (places % RAYS)) & 1 != 0
+
+    def fold(self, places: Any, test: Callable[[Any, Any], Any], state: Any) -> Any:
+        """Folds the candidates of rays in these places (k,), which have answers, into a state:
+        `test(slot, state)` is the next one."""
+        bundle = places // RAYS
+        noted = dr.gather(type(places), self.noted, bundle)
+        return Candidates(self.slots, self.concerned).fold(bundle, noted, places % RAYS, test, state)
+
+
+def answers_to(
+    index: Any,
+    rays: int,
+    in_bundles: Callable[[Any, bool], Found],
+    among: Callable[[Found, Any, Any], Any],
+    singly: Callable[[Any], Any],
+) -> Any:
+    """The answers to so many rays by number.
+
+    `in_bundles(numbers, both)`: by bundles with these numbers (n,), by the kernel for both signs or the
+    other; `among(found, places, numbers)`: by the candidates of rays in these places (k,) of what bundles
+    found, or `DOUBTFUL`; `singly(numbers)`: by walks of single rays (k,). `index`: the type of numbers and
+    answers.
+    """
+
+    def settled(bundles: Any, both: bool) -> Found:
+        found = in_bundles(bundles, both)
+        places = found.open_places()
+        if len(places) > 0:
+            numbers = dr.gather(index, bundles, places // RAYS) * RAYS + places % RAYS
+            answers = among(found, places, numbers)
+            doubtful = _numbers_where(answers == DOUBTFUL)
+            if len(doubtful) > 0:
+                dr.scatter(answers, singly(dr.gather(index, numbers, doubtful)), doubtful)
+            dr.scatter(found.answers, answers, places)
+        dr.eval(found.answers)
+        return found
+
+    found = settled(dr.arange(index, rays // RAYS), False)
+    numbers = _numbers_where(found.unknown == 1)
     if len(numbers) > 0:
         ray = dr.arange(index, len(numbers) * RAYS)
         place = dr.gather(index, numbers, ray // RAYS) * RAYS + ray % RAYS
-        dr.scatter(answers, in_bundles(numbers, True)[0], place)
-        dr.eval(answers)
-    numbers = _numbers_where(answers == DOUBTFUL)
-    if len(numbers) > 0:
-        dr.scatter(answers, singly(numbers), numbers)
-        dr.eval(answers)
-    return answers
+        dr.scatter(found.answers, settled(numbers, True).answers, place)
+        dr.eval(found.answers)
+    return found.answers
 
 
 def _numbers_where(mask: Any) -> Any:
@@ -105,130 +171,3 @@ def _numbers_where(mask: Any) -> Any:
     padded = dr.gather(index, numbers, dr.minimum(slot, dr.opaque(index, n - 1)))
     dr.eval(padded)
     return padded
-
-
-@dataclass
-class SeenTriangle:
-    """n triangles seen from a point: `sides`: normals (3, n) of the planes through the point and each edge,
-    turned inwards, `blur`: how much their products with a direction may be off; `rate`: u = d . rate; `share`
-    of u by which it may be off; `edge_on`: it is not known from which side the triangle is seen."""
-
-    sides: tuple[Any, Any, Any]
-    blur: Any
-    rate: Any
-    share: Any
-    edge_on: Any
-
-    @staticmethod
-    def of(backend: Backend, triangle: Triangle, point: Any, rounding: Any) -> SeenTriangle:
-        """`rounding`: bound on all that lines through the point and single rays may be off."""
-        a, b, c = triangle.v0 - point, triangle.v1 - point, triangle.v2 - point
-        height = -dr.dot(triangle.normal, a)
-        sides = (
-            dr.cross(b, triangle.v2 - triangle.v1),
-            dr.cross(c, triangle.v0 - triangle.v2),
-            dr.cross(a, triangle.v1 - triangle.v0),
-        )
-        inverse = -dr.rcp(height)
-        return SeenTriangle(
-            sides=tuple(backend.Vector3(*(dr.mulsign(x, inverse) for x in side)) for side in sides),
-            blur=rounding * triangle.edge,
-            rate=triangle.normal * inverse,
-            share=rounding * dr.abs(inverse),
-            edge_on=dr.abs(height) <= rounding,
-        )
-
-    def along(self, d: Any) -> Passage:
-        """How rays in unit directions (3, n) pass it."""
-        inside = smallest(dr.dot(side, d) for side in self.sides)
-        u = dr.dot(self.rate, d)
-        # Comparisons with NaN are false: what is not known to be missed may be met.
-        missed = (inside < -self.blur) & ~self.edge_on
-        return Passage(missed, inside > self.blur, dr.fma(-self.share, u, u), dr.fma(self.share, u, u))
-
-
-@dataclass
-class Passage:
-    """How n rays pass triangles: masks of those that certainly are `missed` and that are met `within` the
-    edges; else neither. `low`, `high`: bounds on the reciprocal distance of the plane."""
-
-    missed: Any
-    within: Any
-    low: Any
-    high: Any
-
-
-@dataclass
-class Cones:
-    """Bundles prepared for box tests: between which reciprocals of directions theirs lie, on each axis, as
-    rates and shifts that take a plane to a distance from the point. `start`: distance before which nothing
-    counts; `mixed` (3 masks): directions have both signs on an axis.
-
-    Most bundles are not mixed, and their test is cheaper: the others are told from it (`unknown`), and go
-    through a kernel for `both` by themselves.
-    """
-
-    octant: Any
-    mixed: Any
-    rates: tuple[Any, Any]
-    first: tuple[Any, Any]
-    last: tuple[Any, Any]
-    start: Any
-    both: bool
-
-    @staticmethod
-    def of(
-        backend: Backend,
-        lists: NodeLists,
-        point: Any,
-        directions: list[Any],
-        start: Any,
-        rounding: Any,
-        both: bool,
-    ) -> Cones:
-        """Of rays in unit `directions` (RAYS of (3, n)); the rest as for `SeenTriangle`."""
-        vector = backend.Vector3
-        low = vector(*(smallest(d[k] for d in directions) for k in range(3)))
-        high = vector(*(largest(d[k] for d in directions) for k in range(3)))
-        mixed = ~((low > 0) | (high < 0))
-        if both:
-            low, high = (
-                dr.select(mixed, wider, x)
-                for x, wider in ((low, dr.minimum(low, -TINY)), (high, dr.maximum(high, TINY)))
-            )
-        inverses = (dr.rcp(low), dr.rcp(high))
-        widest = vector(*(select_max(dr.abs(a), dr.abs(b)) for a, b in zip(*inverses, strict=True)))
-        width = rounding * widest
-        step, origin = (1, 0) if lists.grid is None else (lists.grid.step, lists.grid.low)
-        shifts = tuple((origin - point) * inverse for inverse in inverses)
-        last = tuple(shift + width for shift in shifts)
-        if both:  # where the lowest direction enters through the plane that the highest crosses last
-            last = dr.select(mixed, shifts[0] - width, last[0]), last[1]
-        return Cones(
-            octant=octant_of(backend, high),
-            mixed=mixed,
-            rates=tuple(step * inverse for inverse in inverses),
-            first=tuple(shift - width for shift in shifts),
-            last=last,
-            start=start,
-            both=both,
-        )
-
-    @property
-    def unknown(self) -> Any:
-        """Mask: nothing is known of a bundle."""
-        return type(self.mixed.x)(False) if self.both else self.mixed.x | self.mixed.y | self.mixed.z
-
-    def crossed(self, node: Node, least: Any) -> Any:
-        """Mask: some ray may meet the box, at a reciprocal distance above `least`."""
-        entry, leave = self.start, type(self.start)(dr.inf)
-        for k in range(3):
-            near = [dr.fma(node.first[k], r[k], s[k]) for r, s in zip(self.rates, self.first, strict=True)]
-            far = [dr.fma(node.last[k], r[k], s[k]) for r, s in zip(self.rates, self.last, strict=True)]
-            enters, leaves = select_min(*near), select_max(*far)
-            if self.both:
-                # Away from a box on either side nobody meets it; nobody leaves the slab for good.
-                enters = dr.select(self.mixed[k], select_max(near[1], far[0]), enters)
-                leaves = dr.select(self.mixed[k], dr.inf, leaves)
-            entry, leave = select_max(entry, enters), select_min(leave, leaves)
-        return (entry <= leave) & (entry * least <= BEHIND)

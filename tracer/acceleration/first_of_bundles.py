@@ -8,22 +8,32 @@ from typing import Any
 
 import drjit as dr
 
-from tracer.acceleration.bundles import DOUBTFUL, RAYS, Cones, SeenTriangle
-from tracer.acceleration.triangle import TriangleTables, fetch_triangle
+from tracer.acceleration.bundle_tests import Cones, SeenTriangle
+from tracer.acceleration.bundles import RAYS, Found, masks_in_word
+from tracer.acceleration.candidates import Candidates
+from tracer.acceleration.triangle import TriangleTables, gather_triangle
 from tracer.acceleration.walk import walk
 from tracer.backends import INVALID, Backend
-from tracer.ray import max_abs, smallest
+from tracer.ray import largest, max_abs, select_max, smallest
 
-STRIDE = 3
+STRIDE = 4
 """Steps through the list of nodes between two tests, which are long."""
 
-MOST_TRIANGLES = 64
+MOST_TRIANGLES = 96
 """Bundles that meet more are given up."""
 
 ROUNDING = 64
 """How far off a ray may be, in eps of the largest coordinate in play. Seen from the eye: the ray's own origin
 and direction round (30), and what is computed with them here (17); projected corners of the other test round,
 too (20). Few of these errors are ever as large as they may be, and they do not add up all at once."""
+
+MOST_SHARE = 2.0**-7
+"""A triangle whose distance may be off by a larger share is never met for certain: it is seen edge-on."""
+
+HOPE, HELD = 1 - 2.0**-5, 1 + 2.0**-7
+"""Where a ray may meet a triangle, what lies much farther (by this factor of the reciprocal distance) is left
+out for that ray: of two neighbors that share an edge, one will be met. The bundle has told enough where that
+hope held: something is met no farther than this, a factor of the distance, rounding included."""
 
 
 @dataclass
@@ -41,66 +51,57 @@ class Bundles:
         return Bundles(eye, [d for _, d in rays], [dr.sqrt(dr.squared_norm(o - eye)) for o, _ in rays])
 
 
-def nearest_of_bundles(
-    backend: Backend, tables: TriangleTables, bundles: Bundles, both: bool
-) -> tuple[list[Any], Any]:
-    """For each of the RAYS rays of bundles the primitive (n,) that it meets first: `INVALID` for none,
-    `DOUBTFUL` where that is not certain. Then mask (n,) of the bundles of which nothing is known, unless for
-    `both` signs (see `Cones`)."""
+@dataclass
+class _Nearest:
+    """What n rays have met so far: the `slot` of the nearest certain hit, and `near`, the least
+    reciprocal distance that it may have, 0 for nothing; or, where that is larger, a hope (see `HOPE`)."""
+
+    near: Any
+    slot: Any
+
+
+def nearest_of_bundles(backend: Backend, tables: TriangleTables, bundles: Bundles, both: bool) -> Found:
+    """For each of the RAYS rays of bundles the slot of the triangle that it meets first, `INVALID` for none;
+    `both`: by the kernel for both signs (see `Cones`)."""
     rounding = backend.Float(ROUNDING * backend.epsilon * (max_abs(bundles.eye) + tables.lists.extent))
-    cones = Cones.of(
-        backend, tables.lists, bundles.eye, bundles.directions, smallest(bundles.starts), rounding, both
-    )
-    latest = [dr.rcp(start) for start in bundles.starts]
+    begins = smallest(bundles.starts), largest(bundles.starts)
+    cones = Cones.of(backend, tables.lists, bundles.eye, bundles.directions, begins[0], rounding, both)
+    latest = tuple(dr.rcp(start) for start in begins)
+    n = dr.width(cones.octant)
+    bundle, candidates = dr.arange(backend.UInt32, n), Candidates.room(backend, n)
 
     def test(slot: Any, state: Any) -> Any:
-        triangle, primitive = fetch_triangle(backend, tables.rows, slot)
+        tested, _, spread, close, noted, rays = state
+        triangle = gather_triangle(backend, tables.rows, slot)
         seen = SeenTriangle.of(backend, triangle, bundles.eye, rounding)
-        rays = [
-            ray.nearer(seen, d, last, primitive)
-            for ray, d, last in zip(state[2], bundles.directions, latest, strict=True)
-        ]
-        return state[0] + 1, _farthest(rays), rays
+        clear = seen.share <= MOST_SHARE
+        spread = dr.select(clear, select_max(spread, dr.fma(3, seen.share, 1)), spread)
+        unclear, found = [], []
+        for ray, d in zip(rays, bundles.directions, strict=True):
+            passage = seen.along(d)
+            began = passage.high < latest[1]
+            certain = clear & began & passage.within & (passage.low > ray.near * spread)
+            possible = ~passage.missed & ~(passage.high < ray.near) & ~(passage.low > latest[0])
+            unclear.append(possible & ~certain)
+            hope = clear & began & unclear[-1]
+            near = dr.select(hope, select_max(passage.low * HOPE, ray.near), ray.near)
+            found.append(_Nearest(dr.select(certain, passage.low, near), dr.select(certain, slot, ray.slot)))
+        concerned = masks_in_word(backend, unclear)
+        noted = candidates.note(bundle, noted, slot, concerned)
+        return tested + 1, smallest(ray.near for ray in found), spread, close | concerned, noted, found
 
     unknown = cones.unknown
-    none = dr.zeros(backend.Float, dr.width(cones.octant))
-    nothing = _Nearest(none, none, dr.select(unknown, backend.UInt32(DOUBTFUL), INVALID))
-    tested, _, rays = walk(
+    zero, none = dr.zeros(backend.Float, n), dr.zeros(backend.UInt32, n)
+    nothing = _Nearest(zero, dr.full(backend.UInt32, INVALID, n))
+    tested, _, _, close, noted, rays = walk(
         backend,
         tables.lists,
         cones.octant,
         crosses=lambda node, state: ~unknown & cones.crossed(node, state[1]),
         test=test,
-        state=(backend.UInt32(none), none, [nothing for _ in range(RAYS)]),
+        state=(none, zero, zero + 1, none, none, [nothing for _ in range(RAYS)]),
         done=lambda state: state[0] > MOST_TRIANGLES,
         stride=STRIDE,
     )
-    return [dr.select(tested > MOST_TRIANGLES, DOUBTFUL, ray.primitive) for ray in rays], unknown
-
-
-@dataclass
-class _Nearest:
-    """What n rays have met first so far: its `primitive`, and bounds on the reciprocal distance; 0 for
-    nothing, infinite for a doubtful ray, which nothing makes clear again."""
-
-    low: Any
-    high: Any
-    primitive: Any
-
-    def nearer(self, seen: SeenTriangle, d: Any, latest: Any, primitive: Any) -> _Nearest:
-        """The same with this triangle. `latest`: reciprocal distance of the start of rays along d."""
-        passage = seen.along(d)
-        low, high = passage.low, passage.high
-        possible = ~passage.missed & ~(high < self.low) & ~(low > latest)
-        certain = passage.within & (low > self.high) & (high < latest)
-        infinite = type(low)(dr.inf)
-        return _Nearest(
-            low=dr.select(possible, dr.select(certain, low, infinite), self.low),
-            high=dr.select(possible, dr.select(certain, high, infinite), self.high),
-            primitive=dr.select(possible, dr.select(certain, primitive, DOUBTFUL), self.primitive),
-        )
-
-
-def _farthest(rays: list[_Nearest]) -> Any:
-    """The least reciprocal distance up to which anything still counts, for some ray."""
-    return smallest(ray.low for ray in rays)
+    lost = dr.select(unknown | (tested > MOST_TRIANGLES), backend.UInt32((1 << RAYS) - 1), 0)
+    return Found.of(backend, [ray.slot for ray in rays], lost, close, noted, candidates, unknown)

@@ -12,7 +12,9 @@ from typing import Any
 
 import drjit as dr
 
-from tracer.acceleration.bundles import DOUBTFUL, RAYS, Cones, SeenTriangle
+from tracer.acceleration.bundle_tests import Cones, SeenTriangle
+from tracer.acceleration.bundles import RAYS, Found, masks_in_word
+from tracer.acceleration.candidates import Candidates
 from tracer.acceleration.triangle import TriangleTables, fetch_triangle, largest_slack
 from tracer.acceleration.walk import walk
 from tracer.backends import Backend
@@ -61,24 +63,21 @@ def certain_reach(backend: Backend, tables: TriangleTables, p: Any, normal: Any,
 
 def hidden_points(
     backend: Backend, tables: TriangleTables, light: Any, bundles: LitPoints, both: bool
-) -> tuple[list[Any], Any]:
-    """For each of the RAYS points of bundles (n,): whether triangles leave it `LIT` by a light (3, 1), it is
-    `HIDDEN`, or that is `DOUBTFUL`. Then mask (n,) of the bundles of which nothing is known, unless for
-    `both` signs (see `Cones`)."""
+) -> Found:
+    """For each of the RAYS points of bundles: whether triangles leave it `LIT` by a light (3, 1), or it is
+    `HIDDEN`; `both`: by the kernel for both signs (see `Cones`)."""
     asked = [reach > 0 for reach in bundles.reach]
-    all_asked = _bits(backend, asked)
+    all_asked = masks_in_word(backend, asked)
     none = dr.zeros(backend.UInt32, dr.width(all_asked))
+    candidates = Candidates.room(backend, dr.width(all_asked))
 
-    def walked(found: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
-        return _walked(backend, tables, light, bundles, asked, all_asked, both, found)
+    def walked(_: Any) -> Any:
+        return _walked(backend, tables, light, bundles, asked, all_asked, both, candidates)
 
-    nothing = none, none, dr.full(backend.Bool, False, dr.width(none))
-    hidden, possible, unknown = changed_where(all_asked != 0, nothing, walked, label="asked")
-    answers = []
-    for k in range(RAYS):
-        doubtful = dr.select((possible >> k) & 1 != 0, backend.UInt32(DOUBTFUL), LIT)
-        answers.append(dr.select((hidden >> k) & 1 != 0, HIDDEN, doubtful))
-    return answers, unknown
+    nothing = none, none, none, none, none != 0
+    hidden, lost, close, noted, unknown = changed_where(all_asked != 0, nothing, walked, label="asked")
+    answers = [dr.select((hidden >> k) & 1 != 0, backend.UInt32(HIDDEN), LIT) for k in range(RAYS)]
+    return Found.of(backend, answers, lost, close, noted, candidates, unknown)
 
 
 def _walked(
@@ -89,10 +88,10 @@ def _walked(
     asked: list[Any],
     all_asked: Any,
     both: bool,
-    nothing: tuple[Any, Any, Any],
-) -> tuple[Any, Any, Any]:
-    """Of those who ask, a bit for each that certainly is hidden, and for each that may be; and mask of the
-    bundles of which nothing is known."""
+    candidates: Candidates,
+) -> tuple[Any, Any, Any, Any, Any]:
+    """Words with a bit for each who asks that certainly is hidden, that gets no answer, and of whom
+    `candidates` decide; how many these are; and mask of the bundles of which nothing is known."""
     points = bundles.points()
     primitives = bundles.primitives()
     ways = [p - light for p in points]
@@ -104,30 +103,35 @@ def _walked(
     unknown = cones.unknown
     farthest = smallest(dr.select(asks, i, dr.inf) for asks, i in zip(asked, inverse, strict=True))
     latest = [dr.rcp(reach) for reach in bundles.reach]
+    bundle = dr.arange(backend.UInt32, dr.width(all_asked))
 
     def test(slot: Any, state: Any) -> Any:
-        tested, hidden, possible = state
+        tested, hidden, possible, noted = state
         triangle, primitive = fetch_triangle(backend, tables.rows, slot)
         seen = SeenTriangle.of(backend, triangle, light, rounding)
         hides, may_hide = [], []
         for k, (d, end) in enumerate(zip(directions, inverse, strict=True)):
             passage = seen.along(d)
             may_hide.append(~passage.missed & ~(passage.high < end) & (primitive != primitives[k]))
-            hides.append(may_hide[k] & passage.within & ~seen.edge_on & (passage.low > latest[k]))
-        return tested + 1, hidden | _bits(backend, hides), possible | _bits(backend, may_hide)
+            hides.append(may_hide[k] & passage.within & (passage.low > latest[k]))
+        hidden = hidden | masks_in_word(backend, hides)
+        concerned = masks_in_word(backend, may_hide) & all_asked & ~hidden
+        return tested + 1, hidden, possible | concerned, candidates.note(bundle, noted, slot, concerned)
 
-    tested, hidden, possible = walk(
+    none = dr.zeros(backend.UInt32, dr.width(all_asked))
+    tested, hidden, possible, noted = walk(
         backend,
         tables.lists,
         cones.octant,
         crosses=lambda node, _: ~unknown & cones.crossed(node, farthest),
         test=test,
-        state=(dr.zeros(backend.UInt32, dr.width(all_asked)), *nothing[:2]),
+        state=(none, none, none, none),
         done=lambda state: (state[0] > MOST_TRIANGLES) | ((all_asked & ~state[1]) == 0),
         stride=STRIDE,
     )
-    doubtful = unknown | (tested > MOST_TRIANGLES)
-    return hidden & all_asked, dr.select(doubtful, all_asked, possible & all_asked), unknown | nothing[2]
+    hidden = hidden & all_asked
+    lost = dr.select(unknown | (tested > MOST_TRIANGLES), all_asked & ~hidden, 0)
+    return hidden, lost, possible & ~hidden, noted, unknown
 
 
 def _of_those_who_ask(directions: list[Any], asked: list[Any]) -> list[Any]:
@@ -136,11 +140,3 @@ def _of_those_who_ask(directions: list[Any], asked: list[Any]) -> list[Any]:
     for d, asks in zip(directions, asked, strict=True):
         some = dr.select(asks, d, some)
     return [dr.select(asks, d, some) for d, asks in zip(directions, asked, strict=True)]
-
-
-def _bits(backend: Backend, masks: list[Any]) -> Any:
-    """Bit k of a word is mask k."""
-    word = backend.UInt32(0)
-    for k, mask in enumerate(masks):
-        word = word | dr.select(mask, backend.UInt32(1 << k), 0)
-    return word

@@ -32,6 +32,13 @@ Visit = Callable[[Any, Any, Any, TriangleTest, Any], Any]
 """(state, distance, primitive id, the whole test, mask of a hit in front of the limit) -> state."""
 
 
+Test = Callable[[Any, Any], Any]
+"""(slot of a triangle, state) -> state."""
+
+Fold = Callable[[Test, Any], Any]
+"""(test, state) -> the state after all tests."""
+
+
 def visit_triangles(
     backend: Backend,
     tables: TriangleTables,
@@ -56,44 +63,81 @@ def visit_triangles(
         return slabs.crossed(node, limit(state))
 
     def visit_all(state: Any) -> Any:
-        axes, leaving = projection_axes(ray.d), departure()
-        rounding = largest_slack(backend.epsilon, ray.o, tables.lists.extent)
-
-        def test(slot: Any, state: Any) -> Any:
-            triangle, primitive = fetch_triangle(backend, tables.rows, slot)
-            found = meet_triangle(backend.epsilon, triangle, ray, axes)
-            other = ~(leaving.active & (leaving.primitive == primitive))
-            met = found.within & (found.t > 0)
-            special = (met & (dr.abs(found.speed) < GRAZING)) | may_be_doubtful(leaving, found, rounding)
-            if light is not None:
-                special = special | (met & (dr.abs(_height_of(light, found)) <= rounding))
-
-            def with_care(t: Any, valid: Any) -> tuple[Any, Any]:
-                t, valid = dr.select(
-                    other & doubtful(leaving, found),
-                    meet_near_origin(leaving, ray, triangle, found),
-                    (t, valid),
-                )
-                t, valid = dr.select(
-                    dr.abs(found.speed) < GRAZING, _in_own_box(slabs, ray, triangle, t, valid), (t, valid)
-                )
-                if light is not None:
-                    valid = valid & (dr.abs(_height_of(light, found)) > found.slack)
-                return t, valid
-
-            t, valid = dr.if_stmt(
-                args=(found.t, met),
-                cond=special,
-                true_fn=with_care,
-                false_fn=lambda t, valid: (t, valid),
-                rv_labels=("t", "valid"),
-                label="near the origin, grazing, or a light on the plane",
-            )
-            return visit(state, t, primitive, found, valid & other & (t <= limit(state)))
-
+        test = _test(backend, tables, ray, slabs, departure(), limit, visit, light)
         return walk(backend, tables.lists, slabs.octant, crosses, test, state, done)
 
     return within_root(backend, tables.lists, slabs.octant, crosses, active, state, visit_all)
+
+
+def visit_some(
+    backend: Backend,
+    tables: TriangleTables,
+    ray: Ray,
+    departure: Callable[[], Departure],
+    state: Any,
+    limit: Callable[[Any], Any],
+    visit: Visit,
+    active: Any,
+    fold: Fold,
+    light: Any = None,
+) -> Any:
+    """The same for triangles that are known beforehand: `fold` takes a state through the tests of their
+    slots."""
+
+    def visit_them(state: Any) -> Any:
+        slabs = Slabs.of(backend, tables.lists, ray)
+        return fold(_test(backend, tables, ray, slabs, departure(), limit, visit, light), state)
+
+    return changed_where(active, state, visit_them, label="some")
+
+
+def _test(
+    backend: Backend,
+    tables: TriangleTables,
+    ray: Ray,
+    slabs: Slabs,
+    leaving: Departure,
+    limit: Callable[[Any], Any],
+    visit: Visit,
+    light: Any,
+) -> Test:
+    """The test of the triangle in a slot."""
+    axes = projection_axes(ray.d)
+    rounding = largest_slack(backend.epsilon, ray.o, tables.lists.extent)
+
+    def test(slot: Any, state: Any) -> Any:
+        triangle, primitive = fetch_triangle(backend, tables.rows, slot)
+        found = meet_triangle(backend.epsilon, triangle, ray, axes)
+        other = ~(leaving.active & (leaving.primitive == primitive))
+        met = found.within & (found.t > 0)
+        special = (met & (dr.abs(found.speed) < GRAZING)) | may_be_doubtful(leaving, found, rounding)
+        if light is not None:
+            special = special | (met & (dr.abs(_height_of(light, found)) <= rounding))
+
+        def with_care(t: Any, valid: Any) -> tuple[Any, Any]:
+            t, valid = dr.select(
+                other & doubtful(leaving, found),
+                meet_near_origin(leaving, ray, triangle, found),
+                (t, valid),
+            )
+            t, valid = dr.select(
+                dr.abs(found.speed) < GRAZING, _in_own_box(slabs, ray, triangle, t, valid), (t, valid)
+            )
+            if light is not None:
+                valid = valid & (dr.abs(_height_of(light, found)) > found.slack)
+            return t, valid
+
+        t, valid = dr.if_stmt(
+            args=(found.t, met),
+            cond=special,
+            true_fn=with_care,
+            false_fn=lambda t, valid: (t, valid),
+            rv_labels=("t", "valid"),
+            label="near the origin, grazing, or a light on the plane",
+        )
+        return visit(state, t, primitive, found, valid & other & (t <= limit(state)))
+
+    return test
 
 
 def distance_to(backend: Backend, lists: NodeLists, ray: Ray, triangle: Triangle) -> Any:
