@@ -54,15 +54,27 @@ def quantize(display: ArrayLike, bits: int = 8) -> NDArray[np.unsignedinteger]:
     top = 2**bits - 1
     source = np.asarray(display)
     result = np.empty(source.shape, np.uint8 if bits == 8 else np.uint16)
-    values, whole = source.reshape(-1), result.reshape(-1)
-    for start in range(0, values.size, BAND):
-        part = values[start : start + BAND].astype(np.float64)
+    values, whole = np.atleast_1d(source), np.atleast_1d(result)
+    rows = max(1, BAND * len(values) // max(1, values.size))
+    for start in range(0, len(values), rows):
+        part = _as_doubles(values[start : start + rows])
         part *= top
         part += 0.5
         np.fmax(part, 0, out=part)  # unlike `maximum`, answers 0 for NaN
         np.fmin(part, top, out=part)
-        whole[start : start + BAND] = part  # the conversion drops the fraction: floor, as nothing is negative
+        whole[start : start + rows] = part  # the conversion drops the fraction: floor, as nothing is negative
     return result
+
+
+def _as_doubles(values: NDArray) -> NDArray[np.float64]:
+    """A copy. Pixels that do not lie end to end share their records with other layers; NumPy copies their few
+    components in less time one after the other."""
+    if values.ndim < 3 or values.flags.c_contiguous:
+        return values.astype(np.float64)
+    copy = np.empty(values.shape)
+    for k in range(values.shape[-1]):
+        copy[..., k] = values[..., k]
+    return copy
 
 
 def _odd(curve: Callable[[NDArray], NDArray], values: ArrayLike) -> NDArray[np.floating]:
