@@ -7,7 +7,6 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 from tracer.backends import Backend
@@ -28,10 +27,10 @@ _LONG = 200  # characters of a value from which on its digest stands for it
 
 
 class KeptBands:
-    """Keeps what a pass over a rectangle finishes; without a work file it does nothing. A context manager.
+    """Keeps what a pass over a rectangle finishes; without a work file it does nothing.
 
-    `seconds`: how long earlier runs traced what `restore` gave back. A band is written while the next one is
-    traced.
+    `seconds`: how long earlier runs traced what `restore` gave back. A band that `finished` has taken is on
+    disk, or the picture is younger than `PATIENCE` and its work file not begun.
     """
 
     def __init__(
@@ -41,15 +40,7 @@ class KeptBands:
         self._work, self._name, self._film, self._identity = work, name, film, identity
         self._started = time.perf_counter()
         self._waiting: list[tuple[Band, dict[str, Any], float]] = []
-        self._writer = ThreadPoolExecutor(1)
-        self._written: Future[None] | None = None
         self.seconds = 0.0
-
-    def __enter__(self) -> KeptBands:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._writer.shutdown()
 
     def restore(self) -> list[Rectangle]:
         """Takes over what an earlier run finished of this pass; the rectangles that remain."""
@@ -71,29 +62,26 @@ class KeptBands:
         """The film has taken this band. Raises `OutputError` when it cannot be kept."""
         if self._work is None:
             return
-        self._wait()
         seconds = time.perf_counter() - self._started
         self._waiting.append((band, copy.deepcopy(self._film.counts), self.seconds + seconds))
-        if seconds > PATIENCE:
-            self._written = self._writer.submit(self._write, self._work)
+        if self._work.started or seconds > PATIENCE:
+            self.finish()
 
     def finish(self) -> None:
-        """Returns when all that was finished is written. Raises `OutputError` when it cannot be kept."""
-        self._wait()
-        if self._work is not None and self._waiting:
-            self._write(self._work)
-
-    def _wait(self) -> None:
-        if self._written is not None:
-            self._written.result()
-
-    def _write(self, work: WorkFile) -> None:
-        if not work.started:
-            work.start(self._identity())
+        """Keeps all that was finished. Raises `OutputError` when it cannot be kept."""
+        if self._work is None or not self._waiting:
+            return
+        if not self._work.started:
+            self._work.start(self._identity())
         waiting, self._waiting = self._waiting, []
         for band, counts, seconds in waiting:
             place = {"pass": self._name, "band": (band.x0, band.y0, band.x1, band.y1)}
-            work.keep(place | {"counts": counts, "seconds": seconds}, self._film.part(band))
+            self._work.keep(place | {"counts": counts, "seconds": seconds}, self._film.part(band))
+
+
+def seconds_in(work: WorkFile) -> float:
+    """How long earlier runs traced what a work file holds."""
+    return sum({str(label["pass"]): label["seconds"] for label in work.labels}.values())
 
 
 def identity_of(

@@ -94,7 +94,8 @@ class Passes:
         `name`: of the pass in the work file, JSON; `cut`: what remains into bands; `report`: is told of
         finished pixels and of the rays of this run.
         """
-        with self.phases.phase("trace"), KeptBands(self._work, name, film, self._identity) as kept:
+        kept = KeptBands(self._work, name, film, self._identity)
+        with self.phases.phase("trace"):
             remaining = kept.restore()
             self.phases.seconds["trace"] += kept.seconds
             earlier = number_of_rays(film.counts)

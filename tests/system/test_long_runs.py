@@ -13,11 +13,14 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.system import under_way
 from tests.system.under_way import finish
+from tracer.film.work_file import MAGIC
+from tracer.film.work_record import Record, record_after
 
 pytestmark = [
     pytest.mark.slow,
@@ -27,8 +30,15 @@ pytestmark = [
 KILLS = int(os.environ.get("TRACER_KILLS", "26"))
 SIZE = (128, 96)
 TURN = ("turntable", "classic", "--scale", "0.1", "--frames", "24", "-o", "t.mp4", "-o", "t.png")
-IN_HAND = 3
-"""Frames that a kill may cost beside the one being traced: traced just now, waiting, being written."""
+
+IN_BANDS = """
+from functools import partial
+from tracer import cli
+from tracer.cli import animation_run
+animation_run.render = partial(animation_run.render, rays_per_band=128 * 32 * 9)
+cli.main()
+"""
+"""The command, with three bands a frame."""
 
 Start = Callable[..., subprocess.Popen[str]]
 
@@ -57,12 +67,36 @@ def emptied(folder: Path) -> dict[str, bytes]:
     return found
 
 
-def test_animations_killed_at_random_lose_the_frames_in_hand(start: Start, tmp_path: Path) -> None:
+def on_disk(folder: Path, record: Path) -> tuple[int, int]:
+    """Pixels of the frames that the record names, and those with the bands of others in work files."""
+    frames = json.loads(record.read_text())["frames"]
+    finished = pixels = len(frames) * SIZE[0] * SIZE[1]
+    for file in folder.glob("*.work"):
+        frame, labels = whole_records(file)
+        if str(frame) not in frames:
+            bands = [label["band"] for label in labels]
+            pixels += sum((x1 - x0) * (y1 - y0) for x0, y0, x1, y1 in bands)
+    return finished, pixels
+
+
+def whole_records(file: Path) -> tuple[int | None, list[dict[str, Any]]]:
+    """Of which frame a work file is, and the labels of the bands in it."""
+    before: Record | int = len(MAGIC)
+    labels = []
+    with file.open("rb") as content:
+        while (record := record_after(content, before, file.stat().st_size)) is not None:
+            labels.append(record.label)
+            before = record
+    return (labels[0]["frame"], labels[1:]) if labels else (None, [])
+
+
+def test_animations_killed_at_random_lose_the_band_in_hand(start: Start, tmp_path: Path) -> None:
+    """All that a run had told to be finished is there: as a frame, or as bands of it in a work file."""
     assert finish(start(*TURN)) == (0, "")
     whole = emptied(tmp_path)
-    record, times, kills, kept = tmp_path / "t.frames" / "frames.json", random.Random(6), 0, 0
+    record, times, kills, kept, finished = tmp_path / "t.frames" / "frames.json", random.Random(6), 0, 0, 0
     while kills < KILLS:
-        process = start(*TURN, "--resume", "--progress", "json")
+        process = start(*TURN, "--resume", "--progress", "json", begin=("-c", IN_BANDS))
         assert process.stderr is not None
         first = process.stderr.readline()  # it has begun to trace, or has no more to trace
         try:
@@ -75,14 +109,15 @@ def test_animations_killed_at_random_lose_the_frames_in_hand(start: Start, tmp_p
         assert code in (0, -signal.SIGKILL)
         if record.exists():
             lines = [line for line in talk.splitlines() if line.endswith("}")]
-            traced = json.loads(lines[-1])["done"] // (SIZE[0] * SIZE[1]) if lines else 0
-            found = len(json.loads(record.read_text())["frames"])
-            assert found >= max(kept, kept + traced - IN_HAND), "finished frames were lost"
-            assert len(list(tmp_path.glob("t.*.png"))) <= found + 1, "the last one may lack its line"
-            kept = found
+            told = json.loads(lines[-1])["done"] if lines else 0
+            finished_now, kept_now = on_disk(tmp_path / "t.frames", record)
+            assert kept_now >= max(kept, finished + told), "finished bands were lost"
+            frames = finished_now // (SIZE[0] * SIZE[1])
+            assert len(list(tmp_path.glob("t.*.png"))) <= frames + 1, "the last one may lack its line"
+            kept, finished = kept_now, finished_now
         elif (tmp_path / "t.mp4").exists():  # it may have been killed after its work was done
             assert emptied(tmp_path) == whole
-            kept = 0
+            kept = finished = 0
         else:
             assert code != 0 and kept == 0, "all finished frames were lost"
     code, _ = finish(start(*TURN, "--resume"))
@@ -111,6 +146,20 @@ def test_ctrl_c_and_kill_during_a_movie(start: Start, tmp_path: Path) -> None:
     assert contents(tmp_path) == whole
 
 
+CRAMPED_MOVIE = """
+import resource
+from tracer import cli
+from tracer.cli import animation_run
+
+def cramped(*arguments):
+    resource.setrlimit(resource.RLIMIT_FSIZE, (40000, 40000))
+    write_movie(*arguments)
+
+write_movie, animation_run.write_movie = animation_run.write_movie, cramped
+cli.main()
+"""
+"""The command, with room for frames of any size, and little for their movie."""
+
 PICTURE = ("render", "room", "--resolution", "160", "120")
 FRAMES = ("turntable", "room", "--resolution", "160", "120", "--frames", "6")
 
@@ -128,12 +177,13 @@ FRAMES = ("turntable", "room", "--resolution", "160", "120", "--frames", "6")
         (
             (*FRAMES, "-o", "f.png"),
             4000,
-            r"f\.0001\.png: cannot be written: File too large; 0 of 6 frames are finished, --resume goes on",
+            r"f\.frames/1\.work: cannot be written: File too large; 0 of 6 frames are finished, "
+            "--resume goes on",
             [],
         ),
         (
             (*FRAMES, "-o", "f.gif"),
-            40000,
+            None,
             r"f\.gif: ffmpeg could not write it: .+; 6 of 6 frames are finished, --resume goes on",
             [],
         ),
@@ -141,12 +191,19 @@ FRAMES = ("turntable", "room", "--resolution", "160", "120", "--frames", "6")
     ids=["png", "exr", "frame", "movie"],
 )
 def test_a_file_that_does_not_fit_is_one_sentence(
-    command: Sequence[str], largest: int, sentence: str, left: list[str], start: Start, tmp_path: Path
+    command: Sequence[str],
+    largest: int | None,
+    sentence: str,
+    left: list[str],
+    start: Start,
+    tmp_path: Path,
 ) -> None:
-    """With room for smaller files only; then with all the room it needs, and --resume."""
+    """With room for smaller files only, in the end where none is named; then with all the room it needs, and
+    --resume."""
     assert finish(start(*command))[0] == 0
     whole = emptied(tmp_path)
-    code, talk = finish(start(*command, largest=largest))
+    begin = ("-c", CRAMPED_MOVIE) if largest is None else under_way.COMMAND
+    code, talk = finish(start(*command, begin=begin, largest=largest))
     assert code == 2
     assert re.fullmatch(rf"tracer: error: {sentence}\n", talk), talk
     assert sorted(contents(tmp_path)) == left

@@ -56,6 +56,43 @@ def test_what_was_kept_comes_back(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def test_arrays_that_share_their_memory_are_written_once(tmp_path: Path) -> None:
+    """Records of four numbers a pixel, one of them whole; a view of little of an array is copied."""
+    pixels = np.arange(4 * 600, dtype=np.float32).reshape(20, 30, 4)
+    arrays = {
+        "color": pixels[..., :3],
+        "shape": pixels[..., 3].view(np.int32),
+        "band": np.arange(8000.0).reshape(80, 100)[8:16],
+        "column": np.arange(8000.0).reshape(80, 100)[:, 1],
+    }
+    work = WorkFile(tmp_path / "a.work")
+    work.start({})
+    before = work.path.stat().st_size
+    work.keep({"piece": 0}, arrays)
+    assert work.path.stat().st_size - before < pixels.nbytes + (800 + 80) * 8 + 1000
+    [(_, found)] = work.records()
+    assert list(found) == list(arrays)
+    for name, array in arrays.items():
+        assert found[name].dtype == array.dtype
+        assert found[name].tobytes() == array.tobytes()
+    work.close()
+
+
+@pytest.mark.parametrize("jobs", [("one", "two"), ("one", "another, longer"), ("some", "a")])
+def test_what_an_earlier_job_left_in_the_file_does_not_come_back(
+    tmp_path: Path, jobs: tuple[str, str]
+) -> None:
+    work = WorkFile(tmp_path / "a.work")
+    work.start({"job": jobs[0]})
+    for piece in range(3):
+        work.keep({"piece": piece}, ARRAYS)
+    work.restart({"job": jobs[1]})
+    work.keep({"piece": 0}, ARRAYS)
+    work.close()
+    assert work.identity() == {"job": jobs[1]}
+    assert pieces(tmp_path / "a.work", {"job": jobs[1]}) == [0]
+
+
 def test_without_resume_it_begins_anew(tmp_path: Path) -> None:
     assert pieces(kept(kept(tmp_path / "a.work"), 1)) == [0]
 
@@ -63,7 +100,7 @@ def test_without_resume_it_begins_anew(tmp_path: Path) -> None:
 def test_a_file_cut_anywhere_gives_its_whole_records(tmp_path: Path) -> None:
     whole = kept(tmp_path / "a.work").read_bytes()
     ends = [len(kept(tmp_path / "b.work", count).read_bytes()) for count in range(4)]
-    for length in range(len(whole) + 1):
+    for length in sorted({*range(0, len(whole), 7), *ends, *(end - 1 for end in ends)}):
         (tmp_path / "c.work").write_bytes(whole[:length])
         assert pieces(tmp_path / "c.work") == list(range(sum(end <= length for end in ends[1:])))
 
@@ -71,7 +108,7 @@ def test_a_file_cut_anywhere_gives_its_whole_records(tmp_path: Path) -> None:
 def test_a_changed_byte_ends_the_file_there(tmp_path: Path) -> None:
     whole = kept(tmp_path / "a.work").read_bytes()
     second = len(kept(tmp_path / "b.work", 1).read_bytes())
-    for place in range(second, len(whole)):
+    for place in range(second, len(whole), 5):
         (tmp_path / "c.work").write_bytes(whole[:place] + bytes([whole[place] ^ 64]) + whole[place + 1 :])
         assert pieces(tmp_path / "c.work") in ([0], [0, 1])
 
@@ -122,8 +159,11 @@ def test_a_file_of_somebody_else_is_left_alone(tmp_path: Path) -> None:
         with pytest.raises(OutputError, match="is in the way: it is no work file of tracer"):
             action()
     assert file.read_text() == "my work"
-    file.write_bytes(MAGIC[:5])  # a crash right at the start
-    assert WorkFile(file).exists()
+    for begin in (MAGIC[:5], MAGIC):  # a crash right at the start
+        file.write_bytes(begin)
+        assert WorkFile(file).exists()
+        assert pieces(file) == []
+        assert WorkFile(file).exists()
     assert not WorkFile(tmp_path / "b.work").exists()
 
 

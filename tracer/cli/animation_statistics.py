@@ -31,8 +31,8 @@ class AnimationStatistics:
         yield
         self._seconds[name] += time.perf_counter() - started
 
-    def take(self, result: Result) -> None:
-        """Adds a frame that was rendered."""
+    def take(self, result: Result, earlier: float) -> None:
+        """Adds a frame that was rendered; `earlier`: the seconds of it that earlier runs have traced."""
         if self._frames:
             self._compiled_later += result.kernels["compiled"]
         else:
@@ -40,7 +40,7 @@ class AnimationStatistics:
         self._frames += 1
         self.add_counts(counts_in(result.stats))
         for phase, seconds in result.stats["seconds"].items():
-            self._seconds[phase] += seconds
+            self._seconds[phase] += seconds - (earlier if phase == "trace" else 0)
 
     def add_counts(self, counts: Mapping[str, Any]) -> None:
         """Adds what a frame took."""

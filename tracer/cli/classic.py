@@ -74,7 +74,8 @@ def classic(
     )
 
     from tracer.cli.classic_room import load_room
-    from tracer.cli.pictures import Wishes, render_scenes
+    from tracer.cli.pictures import render_scenes
+    from tracer.cli.wishes import Wishes
     from tracer.film.atomic import check_writable
     from tracer.scene import Scene
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
 
 import click
 
@@ -22,68 +20,13 @@ from tracer.cli.statistics import (
     save_statistics,
     seconds_since_start,
 )
+from tracer.cli.wishes import Wishes, warn
 from tracer.errors import OutputError
 from tracer.film.result import Result
 from tracer.film.work_file import WorkFile
 from tracer.render import RenderInterrupted, render
 from tracer.scene import Scene, load
 from tracer.scene_warnings import warnings_of
-
-
-@dataclass(frozen=True)
-class Wishes:
-    """What `scene_options` and `picture_options` ask for, as click delivers it."""
-
-    outputs: tuple[str, ...]
-    overrides: tuple[str, ...]
-    allow_outside: bool
-    scale: float
-    resolution: tuple[int, int] | None
-    supersample: int | Literal["adaptive"] | None
-    threshold: float | None
-    crop: tuple[int, int, int, int] | None
-    precision: str
-    backend: str
-    threads: int | None
-    aovs: tuple[str, ...]
-    aov_png: bool
-    bits: str
-    alpha: bool
-    half: bool
-    seed: int | None
-    memory: int | None
-    resume: bool
-    stats: bool
-    quiet: bool
-    progress: str
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """The arguments of `tracer.render`."""
-        names = (
-            "scale",
-            "resolution",
-            "supersample",
-            "threshold",
-            "crop",
-            "precision",
-            "backend",
-            "threads",
-            "seed",
-            "memory",
-        )
-        settings = {name: getattr(self, name) for name in names}
-        return settings | {"aovs": ("depth", *self.aovs), "count_hits": self.stats}
-
-    @property
-    def file_options(self) -> dict[str, Any]:
-        """The arguments of `Result.save`."""
-        return {"bits": int(self.bits), "alpha": self.alpha, "half": self.half}
-
-    @property
-    def reporter(self) -> str:
-        """Which kind of progress is shown."""
-        return "none" if self.quiet and self.progress == "auto" else self.progress
 
 
 def render_scenes(
@@ -212,9 +155,3 @@ class _Picture:
         if not self._work.started:
             return ""
         return f"; the same command with --resume goes on from {self._work.path}"
-
-
-def warn(text: str, wishes: Wishes) -> None:
-    """Says what is allowed and probably a mistake, unless nothing is to be said."""
-    if not wishes.quiet:
-        talk(f"warning: {text}")

@@ -12,7 +12,7 @@ from tracer.cli.failures import report
 from tracer.errors import TracerError, UsageError
 
 if TYPE_CHECKING:
-    from tracer.cli.pictures import Wishes
+    from tracer.cli.wishes import Wishes
     from tracer.ray_tree import EndedRay, HitPoint, LightTerm, PixelTree, RayNode
 
 

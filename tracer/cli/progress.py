@@ -29,6 +29,25 @@ def make_reporter(kind: str, name: str) -> Reporter:
     return _Bar(name) if kind == "bar" else _JsonLines(name) if kind == "json" else _Silence()
 
 
+class FramesProgress:
+    """Of an animation of so many frames, as one long picture; `finished`: how many of them are traced."""
+
+    def __init__(self, reporter: Reporter, frames: int) -> None:
+        self._reporter, self._frames = reporter, frames
+        self._rays = self._rays_of_frame = 0
+        self.finished = 0
+
+    def update(self, done: int, total: int, rays: int) -> None:
+        """So many pixels of this frame are finished, with so many rays of this run."""
+        self._rays_of_frame = rays
+        self._reporter.update(self.finished * total + done, self._frames * total, self._rays + rays)
+
+    def next_frame(self) -> None:
+        """The frame is traced."""
+        self._rays += self._rays_of_frame
+        self.finished += 1
+
+
 class _Silence:
     def update(self, done: int, total: int, rays: int) -> None:
         pass

@@ -60,12 +60,12 @@ def render(
     after a crash or a full disk, and ends with the same bytes.
 
     With --frames, -o names numbered pictures (a name without {frame} gets .0001 and so on) and movies: .mp4,
-    .webm or .gif. Ctrl-C finishes the frame in hand, and --resume goes on with the next one.
+    .webm or .gif. Ctrl-C finishes the band in hand, and --resume goes on with the next one.
 
     \b
       tracer render my.toml --frames 1:240 -o out/{name}.{frame:04d}.exr -o {name}.mp4
     """
-    from tracer.cli.pictures import Wishes, render_scenes
+    from tracer.cli.wishes import Wishes, warn
 
     wishes = Wishes(**options)
     if pixel is not None:
@@ -77,11 +77,13 @@ def render(
     if as_json:
         raise UsageError("--json: shows the rays of a pixel; allowed: with --pixel")
     if frames is None:
+        from tracer.cli.pictures import render_scenes
+
         return render_scenes(scenes, wishes, interruption)
 
-    from tracer.cli.animation import Course, View, render_animations
+    from tracer.cli.animation import render_animations
+    from tracer.cli.animation_job import Course, View
     from tracer.cli.frame_names import read_frames
-    from tracer.cli.pictures import warn
     from tracer.scene import Scene
 
     def animated(scene: Scene) -> View:

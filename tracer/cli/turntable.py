@@ -50,11 +50,12 @@ def turntable(
       tracer turntable my.toml --frames 240 --fps 60 -o turn.webm
       tracer turntable room -o '{name}.{frame:04d}.png' -o '{name}.gif' --scale 0.25
 
-    -o names movies (NAME.mp4 without -o) and numbered pictures. Ctrl-C finishes the frame in hand, and
+    -o names movies (NAME.mp4 without -o) and numbered pictures. Ctrl-C finishes the band in hand, and
     --resume goes on with the next one; the frames of a movie are kept in NAME.frames until it is written.
     """
-    from tracer.cli.animation import Course, View, render_animations
-    from tracer.cli.pictures import Wishes
+    from tracer.cli.animation import render_animations
+    from tracer.cli.animation_job import Course, View
+    from tracer.cli.wishes import Wishes
     from tracer.scene import Scene
     from tracer.turntable import middle_of, turned
 

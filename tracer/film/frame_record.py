@@ -1,8 +1,8 @@
 """Which frames of an animation are finished: a small file beside them, by which `--resume` goes on.
 
 It says of which scene and settings the frames are, and of each finished frame the size and checksum of its
-files, and what it took. It is replaced whole after every frame, when the frame's files are in place already;
-a crash in between costs that one frame.
+files, and what it took. It is replaced whole after every frame, when the frame's files are in place already.
+Frames under way have work files beside it (`tracer.film.frame_work`).
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from tracer.film.atomic import atomic_write
 
 NAME = "frames.json"
 _VERSION = 2
-_OWN = re.compile(r"frames\.json|\d{4,}\.png|\.tracer-[0-9a-f]{16}(\.json|\.png)")
-"""The record, frames for movies, and what a killed process left of them."""
+_OWN = re.compile(r"\d{4,}\.png|\d+\.work|\.tracer-[0-9a-f]{16}(\.json|\.png)")
+"""Frames for movies, work files, and what a killed process left of them or of the record."""
 
 
 class FrameRecord:
@@ -31,7 +31,7 @@ class FrameRecord:
     def __init__(self, folder: Path, made_of: Mapping[str, Any]) -> None:
         """`made_of`: plain values that decide what the frames look like, by the name users know."""
         self.folder = folder
-        self._made_of = json.loads(json.dumps(made_of))
+        self.made_of = json.loads(json.dumps(made_of))
         self._frames: dict[str, dict[str, Any]] = {}
 
     @property
@@ -45,13 +45,14 @@ class FrameRecord:
         return len(self._frames)
 
     def start(self, resume: bool) -> None:
-        """Makes the folder, and finds what is finished, if that is wanted; raises `UsageError` for frames of
-        another scene or other settings."""
+        """Makes the folder and the record, or finds what is finished, if that is wanted; raises `UsageError`
+        for frames of another scene or other settings, and `OutputError`."""
         if resume and self.file.exists():
             self._frames = self._read()
         else:
             self.remove()
             self.folder.mkdir(exist_ok=True)
+            self._write()
 
     def is_done(self, frame: int, files: Sequence[Path]) -> bool:
         """Whether all these files of a frame are there as they were written."""
@@ -69,7 +70,10 @@ class FrameRecord:
         """Notes that the files of a frame are finished, and what it took; raises `OutputError`."""
         sums = [[self._name(file), *_sum_of(file)] for file in files]
         self._frames[str(frame)] = {"files": sums, "counts": dict(counts)}
-        content = {"version": _VERSION, "made of": self._made_of, "frames": self._frames}
+        self._write()
+
+    def _write(self) -> None:
+        content = {"version": _VERSION, "made of": self.made_of, "frames": self._frames}
         with atomic_write(self.file) as temporary:
             temporary.write_text(json.dumps(content), encoding="utf-8")
 
@@ -79,6 +83,7 @@ class FrameRecord:
             for file in self.folder.iterdir():
                 if _OWN.fullmatch(file.name):
                     file.unlink()
+            self.file.unlink()  # last, so that the rest is not left behind
         with suppress(OSError):
             self.folder.rmdir()
 
@@ -91,7 +96,7 @@ class FrameRecord:
             known = False
         if not known:
             raise UsageError(f"{self.file}: is no record of frames; without --resume all are rendered anew")
-        for name, value in self._made_of.items():
+        for name, value in self.made_of.items():
             if made_of.get(name) != value:
                 raise UsageError(
                     f"{self.file}: its frames have another {name} than what is asked for now; "

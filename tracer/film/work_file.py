@@ -9,18 +9,17 @@ JSON) and arrays by name; after Ctrl-C, `kill -9` or a full disk the next run fi
     work.keep({"frame": 12}, {"color": color})
     work.remove()                                       # when the output is written
 
-A record begins with the lengths of its label and of its arrays and with their checksum. So a record that was
-cut short by a crash is recognized; it is dropped, and the file goes on after the last whole one. All that
-`keep` has written survives the process; what a power failure leaves is at most `SYNC_SECONDS` old.
+A record that was cut short by a crash is recognized (`tracer.film.work_record`); it is dropped, and the file
+goes on after the last whole one. All that `keep` has written survives the process; what a power failure
+leaves is about `SYNC_SECONDS` old at most.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import struct
+import threading
 import time
-import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -29,18 +28,11 @@ from typing import IO, Any
 import numpy as np
 
 from tracer.errors import OutputError, UsageError
+from tracer.film.work_record import Label, Record, record_after, write_record
 from tracer.messages import show
 
-MAGIC = b"tracer work file 1\n"
+MAGIC = b"tracer work file 2\n"
 SYNC_SECONDS = 10.0
-
-_HEAD = struct.Struct(
-    "<QQI"
-)  # bytes of the label, bytes of the arrays, CRC-32 of both lengths and both parts
-_LONGEST_LABEL = 1 << 28
-_CHUNK = 1 << 24
-
-Label = dict[str, Any]
 
 
 class WorkFile:
@@ -50,9 +42,9 @@ class WorkFile:
         self.path, self.resume = Path(path), resume
         self.started = False
         self._file: IO[bytes] | None = None
-        self._places: list[tuple[Label, int]] = []  # label and where its arrays begin
-        self._end = 0
+        self._records: list[Record] = []  # the first one says which job it is
         self._synced = time.monotonic()
+        self._syncing: threading.Thread | None = None
 
     def exists(self) -> bool:
         """Whether an earlier run left a work file; raises `OutputError` for a file that is something else."""
@@ -66,6 +58,14 @@ class WorkFile:
         if not MAGIC.startswith(begin):
             raise OutputError(f"{self.path}: is in the way: it is no work file of tracer")
         return True
+
+    def identity(self) -> Label | None:
+        """Of which job the file is; None where there is none, or where its beginning is damaged."""
+        if not self.exists():
+            return None
+        with self.path.open("rb") as file:
+            first = record_after(file, len(MAGIC), os.fstat(file.fileno()).st_size)
+        return None if first is None else first.label
 
     def start(self, identity: Mapping[str, Any]) -> None:
         """Opens the file for a job with these settings (JSON values by name).
@@ -85,119 +85,99 @@ class WorkFile:
             raise
         self.started = True
 
+    def restart(self, identity: Mapping[str, Any]) -> None:
+        """Goes over to another job in the same file, whose memory is used again: that takes a third of the
+        time of new memory. What the file held is gone. Raises `OutputError`."""
+        self.resume = False
+        self._records.clear()
+        self.keep(identity, {})
+
     def _begin(self, identity: Label) -> None:
         assert self._file is not None
         _lock(self._file, self.path)
-        self._end = len(MAGIC)
         if self.resume:
             self._scan()
-        if self._places:
-            _compare(self.path, self._places.pop(0)[0]["label"], identity)
+        if self._records:
+            _compare(self.path, self._records[0].label, identity)
         else:
-            self._write(0, [MAGIC])
+            self._write_magic()
             self.keep(identity, {})
-            self._places.clear()
+
+    @property
+    def labels(self) -> list[Label]:
+        """The labels of all finished pieces, in the order in which they were kept."""
+        return [record.label for record in self._records[1:]]
 
     def records(self) -> Iterator[tuple[Label, dict[str, np.ndarray]]]:
         """The labels and the arrays of all finished pieces, in the order in which they were kept."""
-        for label, place in self._places:
+        for record in self._records[1:]:
             assert self._file is not None
-            self._file.seek(place)
-            arrays = {}
-            for name, dtype, shape in label["arrays"]:
-                arrays[name] = np.empty(shape, dtype)
-                _read_into(self._file, arrays[name])
-            yield label["label"], arrays
+            yield record.label, record.arrays(self._file)
 
     def keep(self, label: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:
         """Appends a finished piece. Raises `OutputError` on a full disk; what was kept before stays."""
-        contiguous = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
-        kinds = [(name, array.dtype.str, array.shape) for name, array in contiguous.items()]
-        text = json.dumps({"label": label, "arrays": kinds}).encode()
-        parts: list[Any] = [text, *map(_bytes_of, contiguous.values())]
-        size = sum(array.nbytes for array in contiguous.values())
-        lengths = _HEAD.pack(len(text), size, 0)
-        checksum = zlib.crc32(lengths)
-        for part in parts:
-            checksum = zlib.crc32(part, checksum)
-        self._write(self._end, [_HEAD.pack(len(text), size, checksum), *parts])
-        self._places.append((json.loads(text), self._end - size))
+        assert self._file is not None
+        before = self._records[-1] if self._records else len(MAGIC)
+        try:
+            self._records.append(write_record(self._file, before, label, arrays))
+        except OSError as error:
+            with suppress(OSError):
+                self._file.truncate(before if isinstance(before, int) else before.end)
+            raise OutputError(f"{self.path}: cannot be written: {error.strerror}") from error
+        self._sync_now_and_then()
 
     def close(self) -> None:
         """Ends the work with the file, which stays for the next run."""
         if self._file is not None:
-            self._sync()
+            self._end_sync()
+            _sync(self._file.fileno())
             self._file.close()
             self._file = None
 
     def remove(self) -> None:
         """The job is done: the file is no longer needed."""
         if self._file is not None:
+            self._end_sync()
             self._file.close()
             self._file = None
         with suppress(OSError):
             self.path.unlink()
 
-    def _write(self, place: int, parts: list[Any]) -> None:
-        """Writes at a place, which makes the file end there; a failure leaves it as it was."""
+    def _write_magic(self) -> None:
         assert self._file is not None
         try:
-            self._file.seek(place)
-            for part in parts:
-                rest = memoryview(part)
-                while rest:
-                    rest = rest[self._file.write(rest) :]
-            self._end = self._file.tell()
-            self._file.truncate(self._end)
-            if time.monotonic() - self._synced > SYNC_SECONDS:
-                self._sync()
+            self._file.truncate(0)
+            self._file.seek(0)
+            self._file.write(MAGIC)
         except OSError as error:
-            with suppress(OSError):
-                self._file.truncate(place)
             raise OutputError(f"{self.path}: cannot be written: {error.strerror}") from error
-
-    def _sync(self) -> None:
-        assert self._file is not None
-        with suppress(OSError):  # a medium that cannot, a pipe for instance
-            os.fsync(self._file.fileno())
-        self._synced = time.monotonic()
 
     def _scan(self) -> None:
         """Finds the whole records; the first one that is not ends the file."""
         assert self._file is not None
         size = os.fstat(self._file.fileno()).st_size
-        while (found := _record_at(self._file, self._end, size)) is not None:
-            label, place, self._end = found
-            self._places.append((label, place))
+        before: Record | int = len(MAGIC)
+        while (record := record_after(self._file, before, size)) is not None:
+            self._records.append(record)
+            before = record
+
+    def _sync_now_and_then(self) -> None:
+        """Beside the work, since a slow medium takes seconds for it."""
+        assert self._file is not None
+        if time.monotonic() - self._synced > SYNC_SECONDS:
+            self._end_sync()
+            self._syncing = threading.Thread(target=_sync, args=(self._file.fileno(),))
+            self._syncing.start()
+            self._synced = time.monotonic()
+
+    def _end_sync(self) -> None:
+        if self._syncing is not None:
+            self._syncing.join()
 
 
-def _record_at(file: IO[bytes], place: int, size: int) -> tuple[Label, int, int] | None:
-    """Label, place of the arrays and end of the record at a place, if it is whole."""
-    file.seek(place)
-    head = file.read(_HEAD.size)
-    if len(head) < _HEAD.size:
-        return None
-    text_length, array_length, checksum = _HEAD.unpack(head)
-    end = place + _HEAD.size + text_length + array_length
-    if text_length > _LONGEST_LABEL or end > size:
-        return None
-    text = file.read(text_length)
-    found = zlib.crc32(text, zlib.crc32(_HEAD.pack(text_length, array_length, 0)))
-    while array_length > 0 and (chunk := file.read(min(_CHUNK, array_length))):
-        found, array_length = zlib.crc32(chunk, found), array_length - len(chunk)
-    if found != checksum:
-        return None
-    return json.loads(text), place + _HEAD.size + text_length, end
-
-
-def _bytes_of(array: np.ndarray) -> memoryview:
-    return array.reshape(-1).view(np.uint8).data
-
-
-def _read_into(file: IO[bytes], array: np.ndarray) -> None:
-    rest = _bytes_of(array)
-    while rest:
-        rest = rest[file.readinto(rest) :]  # type: ignore[attr-defined]
+def _sync(file: int) -> None:
+    with suppress(OSError):  # a medium that cannot, a pipe for instance
+        os.fsync(file)
 
 
 def _compare(path: Path, before: Label, identity: Label) -> None:
