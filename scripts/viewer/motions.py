@@ -39,8 +39,10 @@ def grip(page: Any) -> None:
 CHANGE = "([kind, values]) => viewer.link.change(kind, values)"
 SET = """([which, share]) => {
   const { controls } = viewer.panel; // other choices have other ones
-  const { name, low, high } = controls[Math.floor(which * controls.length)];
-  viewer.link.change("set", { name, value: low + share * (high - low) });
+  const { name, kind, low, high } = controls[Math.floor(which * controls.length)];
+  if (kind === "number") viewer.link.change("set", { name, value: low + share * (high - low) });
+  const color = `#${Math.floor(share * 2 ** 24).toString(16).padStart(6, "0")}`;
+  if (kind === "color") viewer.link.change("paint", { name, color });
 }"""
 LAYERS = ("color", "rays", "shape")
 CHOICES = ("cube", "rabbit")

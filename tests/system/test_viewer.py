@@ -220,6 +220,19 @@ def test_a_slider_works_while_it_moves(page: Page) -> None:
     assert difference(after, at_rest(page)) > 5
 
 
+def test_a_color_is_that_of_the_file_until_it_is_edited(page: Page) -> None:
+    before = at_rest(page)
+    lamp = page.locator('[data-color="lights.0.color"]')
+    first = lamp.input_value()
+    lamp.fill("#ff0000")
+    assert difference(before, at_rest(page)) > 3
+    assert lamp.get_attribute("title") == "sRGB 1, 0, 0"
+    lamp.focus()
+    page.keyboard.press("z")
+    assert difference(before, at_rest(page)) == 0
+    assert lamp.input_value() == first
+
+
 def test_depth_of_field_has_a_focus(page: Page) -> None:
     before = at_rest(page)
     page.locator("#focus").check()
@@ -259,6 +272,7 @@ def test_a_click_draws_the_rays_of_a_pixel(page: Page) -> None:
 def test_saved_scene_and_still_are_the_same_picture(page: Page, viewer: Viewer) -> None:
     page.get_by_role("button", name="x_rotate +").click()
     page.locator('[data-control="lights.0.weight"]').fill("0")
+    page.locator('[data-color="lights.1.color"]').fill("#80ff40")
     at_rest(page)
     for label, file in (("Still (PNG)", ".png"), ("Still (EXR)", ".exr"), ("Scene (TOML)", ".toml")):
         page.get_by_role("button", name=label).click()

@@ -16,9 +16,11 @@ import pytest
 import tracer
 from tracer.errors import SceneError
 from tracer.lights import PointLight
-from tracer.viewer import renderer as renderer_module
+from tracer.viewer import pictures
+from tracer.viewer.controls import Slider
 from tracer.viewer.drafts import compile_copies, compile_filters, draft_of
 from tracer.viewer.frames import STILL_QUALITY, Frame, compressed
+from tracer.viewer.kernels import KernelBound, loaded_kernels
 from tracer.viewer.layers import names_of, picture_of
 from tracer.viewer.lens import looked_at
 from tracer.viewer.pace import LADDER, Pace
@@ -100,8 +102,8 @@ def test_a_picture_that_nobody_waits_for_is_given_up(
     watcher: Watcher, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The view changes between two bands of the picture with all rays."""
-    monkeypatch.setattr(renderer_module, "RAYS_PER_BAND", 256)
-    session, real = watcher.session, renderer_module.render
+    monkeypatch.setattr(pictures, "RAYS_PER_BAND", 256)
+    session, real = watcher.session, pictures.render
     changed = threading.Event()
 
     def render(*arguments: object, **settings: object) -> object:
@@ -110,7 +112,7 @@ def test_a_picture_that_nobody_waits_for_is_given_up(
             session.rotate(5.0, 0.0)
         return real(*arguments, **settings)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(renderer_module, "render", render)
+    monkeypatch.setattr(pictures, "render", render)
     watcher.look()
     frames = watcher.until_rest()
     assert changed.is_set() and watcher.renderer.dropped == 1
@@ -120,14 +122,14 @@ def test_a_picture_that_nobody_waits_for_is_given_up(
 def test_a_picture_that_fails_is_told_and_the_next_one_comes(
     watcher: Watcher, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real, failures = renderer_module.render, [SceneError("the file is gone"), ValueError("a bug")]
+    real, failures = pictures.render, [SceneError("the file is gone"), ValueError("a bug")]
 
     def render(*arguments: object, **settings: object) -> object:
         if failures:
             raise failures.pop(0)
         return real(*arguments, **settings)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(renderer_module, "render", render)
+    monkeypatch.setattr(pictures, "render", render)
     watcher.look()
     while failures:
         time.sleep(0.01)
@@ -146,7 +148,7 @@ def test_an_error_of_a_task_goes_to_who_asked(watcher: Watcher) -> None:
 
 
 def test_no_kernel_is_compiled_while_sliders_move() -> None:
-    """All sliders from end to end, in all sizes of drafts; the kernels are those of the first picture.
+    """All sliders from end to end and all colors, in all sizes of drafts: those of the first picture do.
 
     Not in the renderer's thread: Dr.Jit's record of kernels does not survive threads that end.
     """
@@ -167,9 +169,12 @@ def test_no_kernel_is_compiled_while_sliders_move() -> None:
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         draft(1.0)
         for number, control in enumerate(session.controls):
-            for value in (control.low, control.high):
-                session.set(control.name, value, gesture=number)
-                assert draft(LADDER[number % len(LADDER)]) == [], (control.name, value)
+            for end in range(2):
+                if isinstance(control, Slider):
+                    session.set(control.name, (control.low, control.high)[end], gesture=number)
+                else:
+                    session.paint(control.name, ("#000000", "#ff8000")[end], gesture=number)
+                assert draft(LADDER[number % len(LADDER)]) == [], (control.name, end)
             session.undo()
         session.orbit(7.0, 3.0)
         assert draft(1.0) == []
@@ -231,6 +236,23 @@ def test_a_renderer_at_rest_takes_no_time(watcher: Watcher) -> None:
     before = watcher.renderer.do(time.thread_time).result(timeout=PATIENCE)
     time.sleep(0.5)
     assert watcher.renderer.do(time.thread_time).result(timeout=PATIENCE) - before < 0.1
+
+
+def test_kernels_are_dropped_above_their_bound_and_come_back() -> None:
+    scene = tracer.load("optics_glass", overrides=["camera.resolution=[32, 24]"])
+    before = np.asarray(tracer.render(scene, backend="llvm").color)
+    loaded = loaded_kernels()
+    KernelBound(most=loaded).keep()
+    tracer.render(scene, backend="llvm")
+    assert loaded_kernels() == loaded, "below the bound nothing is dropped"
+    bound = KernelBound(most=loaded - 1)
+    bound.keep()
+    assert np.array_equal(before, np.asarray(tracer.render(scene, backend="llvm").color))
+    reloaded = loaded_kernels() - loaded
+    assert reloaded > 0
+    bound.keep()
+    tracer.render(scene, backend="llvm")
+    assert loaded_kernels() == loaded + reloaded, "the count begins anew"
 
 
 def paced(pace: Pace, cost: Callable[[float], float], frames: int = 60) -> list[float]:

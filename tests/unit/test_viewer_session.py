@@ -9,6 +9,7 @@ import pytest
 import tracer
 from tracer.errors import SceneError
 from tracer.scene import Scene
+from tracer.viewer.controls import Slider
 from tracer.viewer.drafts import draft_of
 from tracer.viewer.session import Session
 from tracer.viewer.state import Source
@@ -22,7 +23,14 @@ SCENE: dict[str, Any] = {
     "materials": {"glass": {"reflection": 0.2, "refraction": 0.6, "ior": 1.5}},
     "textures": {"tiles": {"kind": "checker", "colors": ["#fff", "#000"], "interval": 40.0}},
     "shapes": [
-        {"kind": "sphere", "center": [0, 0, -300], "radius": 100, "material": "glass", "name": "ball"}
+        {
+            "kind": "sphere",
+            "center": [0, 0, -300],
+            "radius": 100,
+            "material": "glass",
+            "name": "ball",
+            "color": [0.123, 0.5, 1.0],
+        }
     ],
 }
 
@@ -31,7 +39,8 @@ def load(choices: dict[str, bool]) -> Scene:
     """The scene; with the choice `cube`, one more shape, with `rotate` another camera."""
     scene = tracer.load(SCENE)
     if choices.get("cube"):
-        scene.add_shape({"kind": "mesh", "builtin": "cube", "name": "cube"})
+        scene.add_shape({"kind": "mesh", "builtin": "cube", "name": "cube", "color": "#f00"})
+        scene.shapes = scene.shapes[::-1]
     if choices.get("rotate"):
         scene.camera.rotate = (20.0, 0.0)
     return scene
@@ -53,14 +62,15 @@ def test_every_number_of_the_issue_has_a_slider(session: Session) -> None:
     assert {"ambient", "cutoff", "lights.0.weight", "lights.0.position.1", "lights.1.center.2"} <= names
     assert {f"materials.glass.{key}" for key in ("reflection", "refraction", "absorption")} <= names
     assert {f"materials.glass.{key}" for key in ("ior", "diffuse", "specular", "shininess")} <= names
-    assert "textures.tiles.interval" in names
+    assert {"textures.tiles.interval", "textures.tiles.colors.0", "textures.tiles.colors.1"} <= names
+    assert {"background", "lights.0.color", "lights.1.color", "shapes.ball.color"} <= names
     assert "camera.depth_of_field.focus" not in names
     session.switch_focus(True, 900.0)
     assert values(session)["camera.depth_of_field.focus"] == 900.0
     assert all(
         control.low <= values(session)[control.name] <= control.high
         for control in session.controls
-        if control.name in values(session)
+        if isinstance(control, Slider)
     )
 
 
@@ -115,6 +125,33 @@ def test_what_has_no_slider_cannot_be_changed(session: Session, name: str) -> No
     assert session.view.revision == revision
 
 
+def test_a_color_keeps_its_numbers_until_it_is_edited(session: Session) -> None:
+    assert values(session)["shapes.ball.color"] == (0.123, 0.5, 1.0)
+    session.paint("lights.0.color", "#ff8000", gesture=1)
+    session.paint("textures.tiles.colors.1", "#0000FF", gesture=2)
+    scene = session.view.scene
+    assert scene.lights[0].color == (1.0, 128 / 255, 0.0)
+    assert scene.textures["tiles"].colors == ((1.0, 1.0, 1.0), (0.0, 0.0, 1.0))  # type: ignore[attr-defined]
+    assert scene.shapes[0].color == (0.123, 0.5, 1.0)
+    session.undo()
+    session.undo()
+    assert session.view.scene == tracer.load(SCENE)
+
+
+def test_a_choice_leaves_a_color_with_its_shape(session: Session) -> None:
+    session.paint("shapes.ball.color", "#00ff00")
+    session.choose("cube", True)
+    assert [shape.color for shape in session.view.scene.shapes] == [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
+
+
+@pytest.mark.parametrize("name", ["ambient", "lights.0.position", "shapes.0.color", "camera.rotate"])
+def test_what_has_no_color_cannot_be_painted(session: Session, name: str) -> None:
+    with pytest.raises(SceneError, match="there is no control"):
+        session.paint(name, "#ffffff")
+    with pytest.raises(SceneError, match="there is no control"):
+        session.set("lights.0.color", 1.0)
+
+
 def test_a_gesture_is_undone_as_one(session: Session) -> None:
     start = session.view.scene
     for k in range(5):
@@ -135,7 +172,7 @@ def test_a_choice_keeps_edits_and_camera(session: Session) -> None:
     session.rotate(3.0, 0.0)
     session.choose("cube", True)
     scene = session.view.scene
-    assert [shape.name for shape in scene.shapes] == ["ball", "cube"]
+    assert [shape.name for shape in scene.shapes] == ["cube", "ball"]
     assert scene.ambient == 0.5 and scene.camera.rotate == (3.0, 0.0)
     session.choose("rotate", True)
     assert session.view.scene.camera.rotate == (20.0, 0.0), "the choice that moves the camera does"

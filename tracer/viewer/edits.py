@@ -1,4 +1,4 @@
-"""Changes of single numbers of a scene by their path, and what hangs together with them."""
+"""Changes of single numbers and colors of a scene by their path, and what hangs together with them."""
 
 from __future__ import annotations
 
@@ -9,25 +9,30 @@ from tracer.scene import Scene
 from tracer.scene.keyed import child_of
 from tracer.viewer.controls import SHARES, Path
 
-Edits = dict[Path, float]
+Rgb = tuple[float, float, float]
+"""A color as it stands in a scene: display-referred sRGB, each from 0 to 1."""
+
+Edits = dict[Path, float | Rgb]
 """Values by path, as they are stated in the scene; the share k_a of a material is never stated."""
 
 
-def value_at(scene: Scene, path: Path) -> float | None:
-    """The number at a path of a scene; None where there is none."""
+def value_at(scene: Scene, path: Path) -> float | Rgb | None:
+    """The number or color at a path of a scene; None where there is none."""
     value: Any = scene
     for part in path:
         try:
-            value = child_of(value, part)
-        except (AttributeError, IndexError, KeyError, TypeError):
+            value = _below(value, part)
+        except (AttributeError, IndexError, KeyError, TypeError, ValueError):
             return None
+    if isinstance(value, tuple) and len(value) == 3:
+        return value
     return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else None
 
 
-def set_value(scene: Scene, path: Path, value: float) -> None:
-    """Sets a number of a scene; raises `SceneError` where the record refuses it."""
+def set_value(scene: Scene, path: Path, value: float | Rgb) -> None:
+    """Sets a number or color of a scene; raises `SceneError` where the record refuses it."""
     *way, last = path
-    if isinstance(last, int):  # a component of a vector, which is set as a whole
+    if isinstance(last, int):  # a part of a tuple, which is set as a whole
         *way, key = way
         record = _record_at(scene, way)
         vector = list(getattr(record, str(key)))
@@ -75,5 +80,12 @@ def _balanced(material: Material, key: str, value: float) -> tuple[float, float]
 def _record_at(scene: Scene, way: list[str | int]) -> Any:
     record: Any = scene
     for part in way:
-        record = child_of(record, part)
+        record = _below(record, part)
     return record
+
+
+def _below(node: Any, part: str | int) -> Any:
+    """What a step leads to: in lists also by name."""
+    if isinstance(node, list) and isinstance(part, str):
+        part = [entry.name for entry in node].index(part)
+    return child_of(node, part)

@@ -147,6 +147,8 @@ class Hub:
                 session.shift(message.by, gesture, stamp)
             case messages.Set():
                 session.set(message.name, message.value, gesture, stamp)
+            case messages.Paint():
+                session.paint(message.name, message.color, gesture, stamp)
             case messages.Choose():
                 session.choose(message.name, message.value, stamp)
             case messages.Focus():

@@ -88,6 +88,14 @@ class Set(_Change):
     value: Number
 
 
+class Paint(_Change):
+    """A color, as #rrggbb."""
+
+    kind: Literal["paint"]
+    name: Text
+    color: Annotated[str, Field(strict=True, pattern="^#[0-9a-fA-F]{6}$")]
+
+
 class Choose(_Change):
     """One of the document's choices."""
 
@@ -159,6 +167,7 @@ _KINDS: TypeAdapter[Any] = TypeAdapter(
         | Rotate
         | Move
         | Set
+        | Paint
         | Choose
         | Focus
         | Show

@@ -6,7 +6,6 @@ and, while a picture is being sharpened, between two bands. Nothing is rendered 
 
 from __future__ import annotations
 
-import itertools
 import logging
 import threading
 import time
@@ -17,12 +16,10 @@ from typing import Any, TypeVar
 
 from tracer.backends import thread_count
 from tracer.errors import TracerError
-from tracer.film.result import Result
-from tracer.render import render
-from tracer.viewer.drafts import compile_copies, compile_filters, draft_of
-from tracer.viewer.frames import DRAFT_QUALITY, STILL_QUALITY, Frame, compressed
-from tracer.viewer.layers import aovs_of, picture_of
+from tracer.viewer.frames import Frame
+from tracer.viewer.kernels import KernelBound
 from tracer.viewer.pace import Pace
+from tracer.viewer.pictures import Dropped, Pictures
 from tracer.viewer.session import Session
 from tracer.viewer.stages import Stage, stages_of
 from tracer.viewer.state import View
@@ -33,16 +30,9 @@ SETTLED = 0.25
 IDLE = 1.0
 """Seconds after which a thread that waits looks around, without need."""
 
-RAYS_PER_BAND = 1 << 17
-"""Primary rays of a launch while a picture is sharpened: soon given up when something moves."""
-
 logger = logging.getLogger("tracer.viewer")
 
 T = TypeVar("T")
-
-
-class _Dropped(Exception):
-    """Nobody waits for this picture any more."""
 
 
 class Renderer:
@@ -62,16 +52,15 @@ class Renderer:
         threads: int | None = None,
     ) -> None:
         self._session, self._publish, self._fail, self._ready = session, publish, fail, ready
-        self._backend, self._threads = backend, threads
-        self._start = session.view.scene
+        self._threads = threads
+        self._pictures = Pictures(session.view.scene, backend)
+        self._kernels = KernelBound()
         self._pace = Pace()
         self._changed = threading.Condition()
         self._tasks: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
         self._stopped = False
-        self._numbers = itertools.count(1)
         self._thread = threading.Thread(target=self._run, name="renderer", daemon=True)
         self.dropped = 0
-        self._has_filters = False
         self._drawing = 0.0  # seconds that the page takes for a frame
         session.on_change = self.wake
 
@@ -106,11 +95,12 @@ class Renderer:
 
     def _run(self) -> None:
         with thread_count(self._threads):
-            compile_copies(self._backend)
+            self._pictures.prepare()
             stages: list[Stage] = []
             revision = -1
             while not self._stopped:
                 self._do_tasks()
+                self._kernels.keep()
                 view = self._session.view
                 if not self._ready():
                     self._wait(view, IDLE, self._ready)
@@ -145,15 +135,11 @@ class Renderer:
             if not (self._stopped or self._tasks or self._session.view is not view or until()):
                 self._changed.wait(seconds)
 
-    # ---- Pictures ----
-
     def _show(self, view: View, stage: Stage) -> bool:
-        """Renders a stage and publishes it; False where it was given up."""
+        """Makes a picture and publishes it; False where it was given up."""
         try:
-            self._prepare(view)
-            started = time.perf_counter()
-            result = self._rendered(view, stage)
-        except _Dropped:
+            frame = self._pictures.frame(view, stage, lambda: self._is_wanted(view))
+        except Dropped:
             self.dropped += 1
             return False
         except TracerError as error:
@@ -163,48 +149,10 @@ class Renderer:
             logger.error("a picture failed: unexpected %s: %s", type(error).__name__, error)
             self._fail(f"unexpected {type(error).__name__}: {error}")
             return True
-        rendered = time.perf_counter()
-        image = picture_of(view.layer, result, legend=not stage.is_draft)
-        jpeg = compressed(image, DRAFT_QUALITY if stage.is_draft else STILL_QUALITY)
-        done = time.perf_counter()
-        height, width = image.shape[:2]
-        self._publish(
-            Frame(
-                number=next(self._numbers),
-                revision=view.revision,
-                stamp=view.stamp,
-                layer=view.layer,
-                width=width,
-                height=height,
-                scale=stage.scale,
-                supersample=stage.supersample,
-                final=stage.is_final,
-                depth=float(result.depth[height // 2, width // 2]),
-                seconds={"render": rendered - started, "compress": done - rendered},
-                jpeg=jpeg,
-            )
-        )
+        self._publish(frame)
         if stage.is_draft:
-            self._pace.took(stage.scale, done - started + self._drawing)
+            self._pace.took(stage.scale, sum(frame.seconds.values()) + self._drawing)
         return True
 
-    def _prepare(self, view: View) -> None:
-        """Compiles what moving the focus will need, when depth of field is on for the first time."""
-        if view.scene.camera.depth_of_field is not None and not self._has_filters:
-            self._has_filters = True
-            compile_filters(view.scene, self._backend)
-
-    def _rendered(self, view: View, stage: Stage) -> Result:
-        def progress(*_: int) -> None:
-            if not stage.is_draft and (self._stopped or self._tasks or self._session.view is not view):
-                raise _Dropped
-
-        return render(
-            draft_of(view.scene, self._start) if stage.is_draft else view.scene,
-            backend=self._backend,
-            supersample=stage.supersample,
-            aovs=("depth", *aovs_of(view.layer)),
-            scale=stage.scale,
-            rays_per_band=RAYS_PER_BAND if stage.supersample > 1 else 1 << 21,
-            progress=progress,
-        )
+    def _is_wanted(self, view: View) -> bool:
+        return not (self._stopped or self._tasks) and self._session.view is view

@@ -9,22 +9,27 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 from tracer.camera import Camera, DepthOfField
 from tracer.errors import SceneError
+from tracer.records import parse_color
 from tracer.scene import Scene
 from tracer.scene.contents import snapshot
 from tracer.viewer import camera as moves
-from tracer.viewer.controls import Control, controls_of
-from tracer.viewer.edits import applied, consequences, value_at
+from tracer.viewer.controls import Control, Slider, Swatch, controls_of
+from tracer.viewer.edits import applied, consequences
+from tracer.viewer.panel import panel_of, values_of
 from tracer.viewer.state import Source, State, View
+from tracer.viewer.steering import Steering
+
+Kind = TypeVar("Kind", bound=Control)
 
 MOST_UNDONE = 200
 """Steps that can be undone."""
 
 
-class Session:
+class Session(Steering):
     """The edited scene. All methods may be called from any thread; `on_change` is told of every change."""
 
     def __init__(self, source: Source) -> None:
@@ -36,7 +41,7 @@ class Session:
         self._undo: list[State] = []
         self._gesture: object = None
         self._view = View(self._base, "color", 0, 0.0, 0.0)
-        self._pivot = moves.pivot_of(self._base.camera, -1.0)
+        super().__init__(self._base.camera)
         self.controls = controls_of(self._base)
         self.on_change: Callable[[], None] = lambda: None
         self._rebuild(self._state)
@@ -49,6 +54,11 @@ class Session:
         return self._view
 
     @property
+    def camera(self) -> Camera:
+        """Its camera."""
+        return self._state.camera
+
+    @property
     def name(self) -> str:
         """The scene's name."""
         return self._base.name
@@ -56,46 +66,19 @@ class Session:
     def described(self) -> dict[str, Any]:
         """The panel: what can be changed, and what may be chosen."""
         with self._lock:
-            labels = self._source.labels
-            return {
-                "scene": self.name,
-                "resolution": list(self._view.scene.camera.resolution),
-                "lights": [light.name or f"light {k}" for k, light in enumerate(self._view.scene.lights)],
-                "controls": [control.described() for control in self.controls],
-                "choices": [
-                    {"name": name, "label": labels[name][0], "answers": labels[name][1:]}
-                    for name in self._state.choices
-                ],
-            }
+            return panel_of(self.name, self._view.scene, self.controls, self._state.choices, self._source)
 
     def values(self) -> dict[str, Any]:
-        """What the panel shows: the values of all controls, the choices, the camera as TOML."""
+        """What the panel shows."""
         with self._lock:
-            scene = self._view.scene
-            numbers = {control.name: self._value(control) for control in self.controls}
-            return {
-                "values": numbers,
-                "choices": self._state.choices,
-                "layer": self._view.layer,
-                "camera": moves.as_toml(scene.camera),
-                "focus": scene.camera.depth_of_field is not None,
-                "undo": len(self._undo),
-                "revision": self._view.revision,
-            }
-
-    def _value(self, control: Control) -> float | None:
-        if control.path[-1] == "absorption":
-            return self._view.scene.materials[str(control.path[1])].absorption
-        return value_at(self._view.scene, control.path)
+            return values_of(self._view, self.controls, self._state.choices, len(self._undo))
 
     # ---- What changes it ----
 
     def set(self, name: str, value: float, gesture: object = None, stamp: float = 0.0) -> None:
         """Moves a slider; raises `SceneError` for one that there is not, or a value that is refused."""
         with self._lock:
-            control = next((control for control in self.controls if control.name == name), None)
-            if control is None:
-                raise SceneError(f"{self.name}: there is no control `{name[:80]}`")
+            control = self._control(name, Slider)
             value = control.clipped(value)
             if control.path[0] == "camera":
                 settings = self._state.camera.depth_of_field
@@ -105,6 +88,19 @@ class Session:
                 return
             edits = self._state.edits | consequences(self._view.scene, control.path, value)
             self._go(replace(self._state, edits=edits), gesture, stamp)
+
+    def paint(self, name: str, color: str, gesture: object = None, stamp: float = 0.0) -> None:
+        """Sets a color, `#rrggbb`; raises `SceneError` for one that has no control."""
+        with self._lock:
+            path = self._control(name, Swatch).path
+            edits = self._state.edits | {path: parse_color(color)}
+            self._go(replace(self._state, edits=edits), gesture, stamp)
+
+    def _control(self, name: str, kind: type[Kind]) -> Kind:
+        for control in self.controls:
+            if control.name == name and isinstance(control, kind):
+                return control
+        raise SceneError(f"{self.name}: there is no control `{name[:80]}`")
 
     def choose(self, name: str, value: bool, stamp: float = 0.0) -> None:
         """Answers one of the document's questions anew; edits and camera stay, but for a camera that is
@@ -126,32 +122,6 @@ class Session:
         """Moves the camera; raises `SceneError` where that leads nowhere."""
         with self._lock:
             self._go(replace(self._state, camera=change(self._state.camera)), gesture, stamp)
-
-    def grab(self, depth: float) -> None:
-        """Says what the camera goes around from now on: what the middle of the picture shows, `depth` from
-        the canvas (-1: nothing)."""
-        with self._lock:
-            self._pivot = moves.pivot_of(self._state.camera, depth)
-
-    def orbit(self, left: float, up: float, gesture: object = None, stamp: float = 0.0) -> None:
-        """Goes around what was grabbed, in degrees."""
-        self.move(lambda camera: moves.orbited(camera, self._pivot, left, up), gesture, stamp)
-
-    def pan(self, right: float, down: float, gesture: object = None, stamp: float = 0.0) -> None:
-        """Moves what was grabbed by shares of the picture's height."""
-        self.move(lambda camera: moves.panned(camera, self._pivot, right, down), gesture, stamp)
-
-    def dolly(self, share: float, gesture: object = None, stamp: float = 0.0) -> None:
-        """Goes a share of the way to what was grabbed."""
-        self.move(lambda camera: moves.dollied(camera, self._pivot, share), gesture, stamp)
-
-    def rotate(self, x: float, y: float, gesture: object = None, stamp: float = 0.0) -> None:
-        """The document's x_rotate and y_rotate."""
-        self.move(lambda camera: moves.rotated(camera, x, y), gesture, stamp)
-
-    def shift(self, by: tuple[float, float, float], gesture: object = None, stamp: float = 0.0) -> None:
-        """The document's move."""
-        self.move(lambda camera: moves.shifted(camera, by), gesture, stamp)
 
     def reset_camera(self, stamp: float = 0.0) -> None:
         """The camera as the scene file has it."""

@@ -4,6 +4,7 @@ export class Link {
   #socket = null;
   #handlers = {};
   #gesture = 0;
+  #sent = new Set(); // stamps of changes that no picture has shown yet
   stamp = 0; // of the last change that was sent
 
   constructor() {
@@ -21,7 +22,15 @@ export class Link {
 
   change(kind, values = {}) {
     this.stamp = performance.now();
+    this.#sent.add(this.stamp);
     this.send({ kind, ...values, stamp: this.stamp, gesture: this.#gesture });
+  }
+
+  // Whether this page sent that change, and not another one; what came before it is forgotten.
+  sent(stamp) {
+    if (!this.#sent.has(stamp)) return false;
+    for (const older of this.#sent) if (older <= stamp) this.#sent.delete(older);
+    return true;
   }
 
   send(message) {

@@ -7,7 +7,9 @@ const KEYS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, -1], ArrowDo
 
 export function listen(picture, link) {
   const canvas = picture.canvas;
+  const down = new Map(); // place of every finger or button, by pointer
   let drag = null;
+  let spread = 0; // pixels between two fingers
   let moved = [0, 0];
   let waiting = false;
   let wheeled = 0;
@@ -20,19 +22,40 @@ export function listen(picture, link) {
   // One message for each picture of the screen, however often the mouse reports.
   const flush = () => {
     waiting = false;
-    const [right, down] = moved;
+    const [right, below] = moved;
     moved = [0, 0];
-    if (!drag || (right === 0 && down === 0)) return;
-    if (drag.pans) link.change("pan", { right, down });
-    else link.change("orbit", { left: -DEGREES * right, up: -DEGREES * down });
+    if (!drag || (right === 0 && below === 0)) return;
+    if (drag.pans) link.change("pan", { right, down: below });
+    else link.change("orbit", { left: -DEGREES * right, up: -DEGREES * below });
+  };
+
+  // Two fingers: nearer by as much as they part.
+  const pinch = () => {
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(() => {
+      waiting = false;
+      const now = apart(down);
+      if (now > 0 && spread > 0 && now !== spread) link.change("dolly", { share: 1 - spread / now });
+      spread = now;
+    });
   };
 
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
+    down.set(event.pointerId, [event.clientX, event.clientY]);
+    if (down.size > 1) {
+      drag = null;
+      spread = apart(down);
+      grab();
+      return;
+    }
     drag = { pans: event.button === 2 || event.shiftKey, from: [event.clientX, event.clientY], far: false, last: picture.place(event) };
     moved = [0, 0];
   });
   canvas.addEventListener("pointermove", (event) => {
+    if (down.has(event.pointerId)) down.set(event.pointerId, [event.clientX, event.clientY]);
+    if (down.size > 1) pinch();
     if (!drag) return;
     if (!drag.far) {
       if (Math.hypot(event.clientX - drag.from[0], event.clientY - drag.from[1]) < CLICK) return;
@@ -49,13 +72,17 @@ export function listen(picture, link) {
     }
   });
   canvas.addEventListener("pointerup", (event) => {
+    down.delete(event.pointerId);
     flush();
     const [x, y] = picture.place(event);
     const inside = x >= 0 && x <= 1 && y >= 0 && y <= 1;
     if (drag && !drag.far && event.button === 0 && inside) link.send({ kind: "look", x, y });
     drag = null;
   });
-  canvas.addEventListener("pointercancel", () => (drag = null));
+  canvas.addEventListener("pointercancel", (event) => {
+    down.delete(event.pointerId);
+    drag = null;
+  });
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   canvas.addEventListener(
     "wheel",
@@ -77,7 +104,14 @@ export function listen(picture, link) {
     } else if (event.key === "+" || event.key === "-") {
       grab();
       link.change("dolly", { share: event.key === "+" ? 0.1 : -0.1 });
-    } else return;
+    } else if (event.key === "Enter") link.send({ kind: "look", x: 0.5, y: 0.5 });
+    else return;
     event.preventDefault();
   });
+}
+
+function apart(down) {
+  if (down.size < 2) return 0;
+  const [[x, y], [u, v]] = down.values();
+  return Math.hypot(x - u, y - v);
 }

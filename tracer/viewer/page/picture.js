@@ -11,7 +11,6 @@ export class Picture {
   #context = this.#canvas.getContext("2d", { alpha: false });
   #link;
   #times = [];
-  #stamp = 0;
   #aspect = 4 / 3;
 
   constructor(link) {
@@ -71,8 +70,7 @@ export class Picture {
   #count(header, now) {
     this.shown += 1;
     this.#times = [...this.#times.filter((time) => now - time < WINDOW), now];
-    if (header.stamp > this.#stamp) {
-      this.#stamp = header.stamp;
+    if (this.#link.sent(header.stamp)) {
       this.latencies = [...this.latencies.slice(-499), now - header.stamp];
     }
     document.getElementById("wait").hidden = true;
