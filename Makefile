@@ -29,7 +29,7 @@ docs: setup ## build the documentation site into build/docs; open build/docs/ind
 	@$(BIN)/python -m sphinx -q -W -n --keep-going -d build/doctrees docs build/docs
 
 test: lint ## run the linters, the type checker and all tests, quick and slow
-	$(BIN)/python -m pytest -m "" --numprocesses auto --maxprocesses 4
+	$(BIN)/python -m pytest -m "" --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 lint: setup ## run the linters and the type checker
 	$(BIN)/ruff check .

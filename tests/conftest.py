@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,11 +18,17 @@ if TYPE_CHECKING:
 
 
 def pytest_sessionstart() -> None:
-    """Without a usable LLVM the run ends at once, with the sentence that users see."""
+    """Without a usable LLVM the run ends at once, with the sentence that users see.
+
+    Processes that test side by side divide the cores among them: more threads than cores cost time.
+    """
     try:
         ensure_llvm()
     except MachineError as error:
         pytest.exit(str(error), returncode=error.exit_code)
+    import drjit as dr
+
+    dr.set_thread_count(max(1, dr.thread_count() // int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))))
 
 
 def pytest_report_header() -> str:
