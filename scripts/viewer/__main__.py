@@ -22,7 +22,12 @@ from scripts.viewer.motions import DRAG, SLIDE, grip
 @click.option("--resolution", type=int, nargs=2, default=(640, 480), show_default=True)
 @click.option("--seconds", default=15.0, show_default=True, help="Of each measurement but the last.")
 @click.option(
-    "--wander", "wandering", default=120.0, show_default=True, help="Seconds of random interaction."
+    "--wander",
+    "wandering",
+    type=click.FloatRange(min=120),
+    default=120.0,
+    show_default=True,
+    help="Seconds of random interaction.",
 )
 @click.option("--seed", default=1, show_default=True)
 def main(scene: str, resolution: tuple[int, int], seconds: float, wandering: float, seed: int) -> None:
@@ -37,8 +42,7 @@ def main(scene: str, resolution: tuple[int, int], seconds: float, wandering: flo
             page.mouse.up()
             page.wait_for_timeout(3000)
             found["sliders"] = measured(page, tracer, browser, cache, seconds, SLIDE)
-            if wandering:
-                found["random interaction"] = leaked(page, tracer, wandering, seed)
+            found["random interaction"] = leaked(page, tracer, wandering, seed)
     click.echo(json.dumps(found, indent=2))
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from scripts.viewer.motions import AT_REST, CHOICES, visit, wander
+from scripts.viewer.motions import AT_REST, wander
 from scripts.viewer.processes import megabytes_of, processes_below, seconds_of
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -25,6 +25,10 @@ REPORT = 10
 
 WARM_UP = 1 / 2
 """Share of the random interaction that the memory curve leaves out: caches fill first."""
+
+
+STRETCHES, STUDENT = 12, 2.228
+"""Parts of the curve that count as independent, and the quantile of Student's t for two fewer."""
 
 
 @contextmanager
@@ -84,10 +88,7 @@ def measured(
 
 def leaked(page: Any, tracer: int, seconds: float, seed: int) -> dict[str, Any]:
     """The memory of the tracer's process and of the page over random interaction, and where it leads."""
-    choices = [name for name in CHOICES if page.locator(f'input[name="choice-{name}"]').count()]
-    start = megabytes_of(tracer)
-    visit(page, choices)
-    step = wander(page, choices, seed)
+    step = wander(page, seed)
     curve: list[tuple[float, float, float]] = []
     began, number = time.perf_counter(), 0
     while (now := time.perf_counter() - began) < seconds:
@@ -97,15 +98,23 @@ def leaked(page: Any, tracer: int, seconds: float, seed: int) -> dict[str, Any]:
             heap = page.evaluate("() => performance.memory.usedJSHeapSize") / 2**20
             curve.append((now, megabytes_of(tracer), heap))
         time.sleep(0.01)
-    late = np.array([row for row in curve if row[0] > WARM_UP * seconds])
-    slope = np.polyfit(late[:, 0], late[:, 1], 1)[0]
+    memory = np.array(curve)
+    late = memory[memory[:, 0] > WARM_UP * seconds]
+    slope, doubt = slope_of(late[:, 0], late[:, 1])
     return {
         "actions": number,
-        "tracer MiB at first": round(start),
-        "when everything was shown once": round(curve[0][1]),
-        "after the warm-up": round(float(late[0, 1])),
-        "at the end": round(float(late[-1, 1])),
-        "MiB a minute after the warm-up": round(60 * float(slope), 2),
-        "two hours would add MiB": round(7200 * float(slope)),
+        "tracer MiB at first": round(curve[0][1]),
+        "mean of each tenth": [round(float(part.mean())) for part in np.array_split(memory[:, 1], 10)],
+        "largest": round(float(memory[:, 1].max())),
+        "two hours would add MiB": [round(7200 * slope), round(7200 * doubt)],
         "page's heap MiB, median at the end": round(float(np.median(late[len(late) // 2 :, 2])), 1),
     }
+
+
+def slope_of(seconds: np.ndarray, values: np.ndarray) -> tuple[float, float]:
+    """Slope of a curve (n,), and the half width of its 95 % interval; from the means of stretches, since what
+    is measured from one second to the next is not independent."""
+    x, y = (np.array([part.mean() for part in np.array_split(a, STRETCHES)]) for a in (seconds, values))
+    slope, rest = np.polyfit(x, y, 1)
+    variance = np.sum((y - slope * x - rest) ** 2) / (STRETCHES - 2)
+    return float(slope), float(STUDENT * np.sqrt(variance / np.sum((x - x.mean()) ** 2)))

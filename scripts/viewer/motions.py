@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Sequence
-from itertools import product
+from collections.abc import Callable
 from typing import Any
 
 AT_REST = "() => window.viewer?.picture?.header?.final"
@@ -44,48 +43,44 @@ SET = """([which, share]) => {
   const color = `#${Math.floor(share * 2 ** 24).toString(16).padStart(6, "0")}`;
   if (kind === "color") viewer.link.change("paint", { name, color });
 }"""
-LAYERS = ("color", "rays", "shape")
-CHOICES = ("cube", "rabbit")
 CUTOFFS = (0.05, 0.03, 0.011)
 
 
-def visit(page: Any, choices: Sequence[str]) -> None:
-    """Shows everything once that has kernels of its own and that `wander` goes to: they stay in memory."""
-    for answers in product((False, True), repeat=len(choices)):
-        for name, value in zip(choices, answers, strict=True):
-            page.evaluate(CHANGE, ["choose", {"name": name, "value": value}])
-        page.evaluate("() => { viewer.lens.clear(); viewer.link.send({ kind: 'look', x: 0.5, y: 0.5 }); }")
-        page.locator("#tree").wait_for(timeout=120_000)
-        for layer, cutoff in product(LAYERS, CUTOFFS):
-            page.evaluate(CHANGE, ["show", {"layer": layer}])
-            page.evaluate(CHANGE, ["set", {"name": "cutoff", "value": cutoff}])
-            page.wait_for_timeout(100)
-            page.wait_for_function(AT_REST, timeout=120_000)
-
-
-def wander(page: Any, choices: Sequence[str], seed: int) -> Callable[[], None]:
-    """Whatever a user may do, at random."""
+def wander(page: Any, seed: int) -> Callable[[], None]:
+    """Whatever a user may do, at random, but for saving."""
     chance = random.Random(seed)
+    layers = page.locator("#layer option").evaluate_all("options => options.map(({value}) => value)")
+    choices = page.locator("#choices input[value='0']").evaluate_all("radios => radios.map(({name}) => name)")
+    choices = [name.removeprefix("choice-") for name in choices]
 
     def step() -> None:
-        kind = chance.randrange(100)
-        if kind < 40:
+        kind = chance.randrange(1000)
+        if kind < 400:
             angles = {"left": chance.uniform(-5, 5), "up": chance.uniform(-2, 2)}
             page.evaluate(CHANGE, ["orbit", angles])
-        elif kind < 85:
+        elif kind < 830:
             page.evaluate(SET, [chance.random(), chance.random()])
-        elif kind < 90:
+        elif kind < 850:
+            page.evaluate(CHANGE, ["set", {"name": "cutoff", "value": chance.choice(CUTOFFS)}])
+        elif kind < 900:
             place = {"kind": "look", "x": chance.random(), "y": chance.random()}
             page.evaluate("(place) => viewer.link.send(place)", place)
-        elif kind < 93:
-            page.evaluate(CHANGE, ["show", {"layer": chance.choice(LAYERS)}])
-        elif kind < 96 and choices:
+        elif kind < 925:
+            page.evaluate(CHANGE, ["show", {"layer": chance.choice(layers)}])
+        elif kind < 945 and choices:
             answer = {"name": chance.choice(choices), "value": chance.random() < 0.5}
             page.evaluate(CHANGE, ["choose", answer])
-        elif kind < 99:
+        elif kind < 950:
+            page.evaluate(CHANGE, ["focus", {"value": chance.random() < 0.3}])
+        elif kind < 985:
             page.evaluate("() => viewer.link.gesture()")
             page.evaluate(CHANGE, [chance.choice(("undo", "undo", "reset")), {}])
+        elif kind < 987:
+            page.evaluate("() => viewer.link.send({ kind: 'compare' })")
+        elif kind < 990:
+            page.set_viewport_size({"width": chance.randint(400, 1400), "height": chance.randint(400, 900)})
         else:
             page.wait_for_timeout(1500)  # the picture is sharpened
+        page.evaluate("() => document.getElementById('comparison').close()")
 
     return step

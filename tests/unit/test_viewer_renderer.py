@@ -20,9 +20,9 @@ from tracer.viewer import pictures
 from tracer.viewer.controls import Slider
 from tracer.viewer.drafts import compile_copies, compile_filters, draft_of
 from tracer.viewer.frames import STILL_QUALITY, Frame, compressed
-from tracer.viewer.kernels import KernelBound, loaded_kernels
 from tracer.viewer.layers import names_of, picture_of
 from tracer.viewer.lens import looked_at
+from tracer.viewer.memory import KernelBound, loaded_kernels
 from tracer.viewer.pace import LADDER, Pace
 from tracer.viewer.renderer import Renderer
 from tracer.viewer.session import Session

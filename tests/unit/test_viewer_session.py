@@ -195,6 +195,33 @@ def test_the_camera_is_reset_to_that_of_the_file(session: Session) -> None:
     assert session.view.scene.camera == start
 
 
+def test_a_file_that_was_changed_is_read_again() -> None:
+    tree: dict[str, Any] = {
+        "shapes": [{"kind": "sphere", "center": [0, 0, -9], "radius": 1, "color": "#f00"}]
+    }
+    session = Session(Source(lambda _: tracer.load(tree)))
+    session.set("ambient", 0.5)
+    tree["lights"] = [{"kind": "point", "position": [1, 2, 3]}]
+    tree["camera"] = {"resolution": [20, 10]}
+    session.reload()
+    scene = session.view.scene
+    assert scene.ambient == 0.5 and len(scene.lights) == 1 and scene.camera.resolution == (20, 10)
+    assert "lights.0.color" in {control.name for control in session.controls}
+    session.rotate(5.0, 0.0)
+    tree["camera"] = {"resolution": [40, 10]}
+    session.reload()
+    assert session.camera.resolution == (20, 10), "a camera that was moved stays"
+    del tree["lights"]
+    tree["shape"] = []
+    before = session.view
+    with pytest.raises(SceneError, match="shape"):
+        session.reload()
+    assert session.view is before
+    session.undo()
+    session.undo()
+    assert session.view.scene.ambient != 0.5 and len(session.view.scene.lights) == 1
+
+
 def test_every_change_is_told_once(session: Session) -> None:
     told: list[int] = []
     session.on_change = lambda: told.append(session.view.revision)

@@ -114,8 +114,8 @@ def _lights(scene: Scene) -> Iterator[Control]:
     for number, light in enumerate(scene.lights):
         heading = light.name or f"light {number}"
         place = "position" if light.kind == "point" else "center"
-        least = 0.0 if len(scene.lights) > 1 else largest / 100  # not all weights may be 0
-        yield Slider(("lights", number, "weight"), "Lights", heading, "weight", least, 2 * largest)
+        if len(scene.lights) > 1:  # only the proportions of weights matter
+            yield Slider(("lights", number, "weight"), "Lights", heading, "weight", 0.0, 2 * largest)
         yield Swatch(("lights", number, "color"), "Lights", heading)
         for axis, value in enumerate(getattr(light, place)):
             low, high = min(center[axis] - reach, value), max(center[axis] + reach, value)
@@ -159,6 +159,11 @@ def _shapes(scene: Scene) -> Iterator[Control]:
         if shape.color is not None:
             key = shape.name if shape.name and names[shape.name] == 1 else number
             yield Swatch(("shapes", key, "color"), "Shapes", shape.name or f"{shape.kind} {number}")
+
+
+def usual_step(scene: Scene) -> float:
+    """A step of the camera in scene units, by the size of what is there."""
+    return float(f"{_surroundings(scene)[1] / 40:.0e}")
 
 
 def _surroundings(scene: Scene) -> tuple[list[float], float]:

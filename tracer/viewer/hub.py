@@ -21,7 +21,7 @@ from tracer.viewer.saving import Folder
 from tracer.viewer.session import Session
 
 MOST_COMPLAINTS = 20
-"""Bad messages of one page that are logged one by one."""
+"""Refused messages of one page that are logged one by one."""
 
 logger = logging.getLogger("tracer.viewer")
 
@@ -95,7 +95,7 @@ class Hub:
     # ---- From a page ----
 
     def hear(self, page: Page, text: str | bytes) -> None:
-        """Does what a page says; a bad message is logged and does nothing, and the page is told why."""
+        """Does what a page says; one that is refused is logged and does nothing, and the page is told why."""
         try:
             self._do(page, messages.parse(text))
         except TracerError as error:
@@ -106,7 +106,7 @@ class Hub:
         page.complaints += 1
         if page.complaints <= MOST_COMPLAINTS:
             last = "; further ones of this page are not logged" if page.complaints == MOST_COMPLAINTS else ""
-            logger.warning("a bad message was ignored: %s%s", " ".join(text.split()), last)
+            logger.warning("a message was refused: %s%s", " ".join(text.split()), last)
 
     def _do(self, page: Page, message: Any) -> None:
         session = self.session
@@ -161,6 +161,8 @@ class Hub:
                 session.show(message.layer, stamp)
             case messages.Reset():
                 session.reset_camera(stamp)
+            case messages.Reload():
+                session.reload(stamp)
             case messages.Undo():
                 session.undo(stamp)
 

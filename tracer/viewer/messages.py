@@ -124,6 +124,12 @@ class Reset(_Change):
     kind: Literal["reset"]
 
 
+class Reload(_Change):
+    """The scene file as it is now."""
+
+    kind: Literal["reload"]
+
+
 class Undo(_Change):
     """The last step back."""
 
@@ -172,6 +178,7 @@ _KINDS: TypeAdapter[Any] = TypeAdapter(
         | Focus
         | Show
         | Reset
+        | Reload
         | Undo
         | Look
         | SaveScene

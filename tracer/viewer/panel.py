@@ -7,7 +7,7 @@ from typing import Any
 
 from tracer.scene import Scene
 from tracer.viewer.camera import as_toml
-from tracer.viewer.controls import Control
+from tracer.viewer.controls import Control, usual_step
 from tracer.viewer.edits import Rgb, value_at
 from tracer.viewer.state import Source, View
 
@@ -20,6 +20,7 @@ def panel_of(
     return {
         "scene": name,
         "resolution": list(scene.camera.resolution),
+        "step": usual_step(scene),
         "controls": [control.described() for control in controls],
         "choices": [
             {"name": choice, "label": labels[choice][0], "answers": labels[choice][1:]} for choice in choices

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 from tracer.backends import thread_count
 from tracer.errors import TracerError
 from tracer.viewer.frames import Frame
-from tracer.viewer.kernels import KernelBound
+from tracer.viewer.memory import KernelBound, give_back
 from tracer.viewer.pace import Pace
 from tracer.viewer.pictures import Dropped, Pictures
 from tracer.viewer.session import Session
@@ -150,6 +150,8 @@ class Renderer:
             self._fail(f"unexpected {type(error).__name__}: {error}")
             return True
         self._publish(frame)
+        if stage.is_final:
+            give_back()
         if stage.is_draft:
             self._pace.took(stage.scale, sum(frame.seconds.values()) + self._drawing)
         return True

@@ -118,6 +118,16 @@ class Session(Steering):
                 camera = base.camera.model_copy(update={"depth_of_field": camera.depth_of_field})
             self._go(State(choices, self._state.edits, camera), None, stamp, base)
 
+    def reload(self, stamp: float = 0.0) -> None:
+        """Reads the scene anew; edits stay, and a camera that was moved. Raises `SceneError` and changes
+        nothing where the file is refused."""
+        with self._lock:
+            base = self._source.load(self._choices)
+            moved = self._state.camera != self._base.camera
+            camera = self._state.camera if moved else base.camera
+            self._rebuild(replace(self._state, camera=camera), stamp, base)
+        self.on_change()
+
     def move(self, change: Callable[[Camera], Camera], gesture: object = None, stamp: float = 0.0) -> None:
         """Moves the camera; raises `SceneError` where that leads nowhere."""
         with self._lock:
@@ -178,7 +188,7 @@ class Session(Steering):
         scene = snapshot(base)
         applied(scene, state.edits)
         scene.camera = state.camera
-        structure = state.choices != self._choices or (
+        structure = base is not self._base or (
             (state.camera.depth_of_field is None) != (self._state.camera.depth_of_field is None)
         )
         self._base, self._choices, self._state = base, state.choices, state

@@ -1,5 +1,6 @@
 // The page: each part has a file of its own.
 
+import { tell } from "./element.js";
 import { Lens } from "./lens.js";
 import { Link } from "./link.js";
 import { listen } from "./mouse.js";
@@ -10,26 +11,25 @@ const link = new Link();
 const picture = new Picture(link);
 const panel = new Panel(link);
 const lens = new Lens(link);
-const notice = document.getElementById("notice");
 const compare = document.getElementById("compare");
 
 listen(picture, link);
 panel.onresolution = (width, height) => picture.shaped(width, height);
 link.on("closed", () => picture.forget());
 link.on("notice", ({ text }) => {
-  notice.textContent = text;
+  tell(text, "problem");
   compare.disabled = false;
 });
-link.on("saved", ({ file }) => (notice.textContent = `saved ${file}`));
+link.on("saved", ({ file }) => tell(`saved ${file}`));
 
 compare.addEventListener("click", () => {
   compare.disabled = true;
-  notice.textContent = "Mitsuba is rendering …";
+  tell("Mitsuba is rendering …");
   link.send({ kind: "compare" });
 });
 link.on("compared", ({ ours, theirs, difference, enlarged, largest, rms, visible, pixels }) => {
   compare.disabled = false;
-  notice.textContent = "";
+  tell("");
   Object.entries({ ours, theirs, difference }).forEach(([id, url]) => (document.getElementById(id).src = url));
   document.getElementById("verdict").textContent =
     `difference × ${enlarged}: largest ${largest.toPrecision(2)}, RMS ${rms.toPrecision(2)}; ` +

@@ -1,9 +1,7 @@
 // The panel: the controls of the scene, the document's choices, the camera's moves. The tracer says what there is.
 
 import { Controls } from "./controls.js";
-import { element } from "./element.js";
-
-const tell = (text) => (document.getElementById("notice").textContent = text);
+import { element, tell } from "./element.js";
 
 export class Panel {
   #link;
@@ -46,6 +44,10 @@ export class Panel {
       link.send(what === "scene" ? { kind: "save_scene" } : { kind: "save_still", suffix: what });
     });
     on("#reset", () => this.#step("reset"));
+    on("#reload", () => {
+      tell("");
+      this.#step("reload");
+    });
     on("#undo", () => this.#step("undo"));
     on("#copy", () => this.#copy());
     document.getElementById("focus").addEventListener("change", ({ target }) => this.#step("focus", { value: target.checked }));
@@ -73,11 +75,12 @@ export class Panel {
     this.#link.change(kind, values);
   }
 
-  #build({ scene, resolution, controls, choices, layers, comparison }) {
+  #build({ scene, resolution, step, controls, choices, layers, comparison }) {
     document.getElementById("scene").textContent = scene;
     document.title = `${scene} · tracer view`;
     document.getElementById("compare").hidden = !comparison;
     document.getElementById("layer").replaceChildren(...layers.map(([value, text]) => element("option", { value, textContent: text })));
+    document.getElementById("units").defaultValue = step; // until another one is typed
     this.onresolution(...resolution);
     this.#choices(choices);
     this.#controls.build(controls);
