@@ -89,6 +89,7 @@ class WorkFile:
         """Goes over to another job in the same file, whose memory is used again: that takes a third of the
         time of new memory. What the file held is gone. Raises `OutputError`."""
         self.resume = False
+        self._synced = time.monotonic()  # what is gone need not reach the medium
         self._records.clear()
         self.keep(identity, {})
 
