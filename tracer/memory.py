@@ -56,7 +56,8 @@ def need_of(
     """What a pass over so many pixels takes; `real`: bytes of a number, 4 or 8. An adaptive picture has a
     film of refined pixels as well."""
     counts = components_of(layers, len(scene.lights))
-    film = sum(width_of(record, counts) for record in records_of(counts, real == 4)) * real
+    single = real == 4
+    film = sum(width_of(record, counts, single) for record in records_of(counts, single)) * real
     written = sum(counts.values()) * 4 + 12
     filtered = FILTER_BYTES if scene.camera.depth_of_field is not None else 0
     refined, listed = (film + NOTED_BYTES, LISTED_BYTES) if adaptive else (0, 0)

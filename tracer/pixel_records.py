@@ -1,7 +1,8 @@
-"""The numbers of a pixel side by side in memory: records of up to four, which are written at once.
+"""The numbers of a pixel side by side in memory: records of up to 64 bytes, each of which is written at once.
 
-Lanes own pixels of tiles, so what they write lies scattered, and four adjacent numbers take less time than
-one by one. So vectors take single numbers along: the coverage stands behind the color.
+Lanes own pixels of tiles, so what they write lies scattered, and adjacent numbers take less time than one by
+one: sixteen at once, a whole line of the cache, half of four times four. So vectors take single numbers
+along: the coverage stands behind the color.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from tracer.film.layout import INTEGERS, component_count
 PLAIN = {"color": 3, "alpha": 1, "depth": 1, "z": 1}
 """What every picture has."""
 
-LENGTH = 4
-"""Numbers that are written at once. Longer values have records of several such parts."""
+LINE = 64
+"""Bytes that are written at once at most."""
 
 
 def components_of(layers: Iterable[str], lights: int) -> dict[str, int]:
@@ -34,24 +35,43 @@ def records_of(counts: Mapping[str, int], mixed: bool) -> list[tuple[str, ...]]:
     `counts`: how many numbers each value has; `mixed`: whether whole numbers may stand with real ones, which
     they do where both have 32 bits.
     """
-    records: list[tuple[str, ...]] = []
+    integers = {name: count for name, count in counts.items() if name in INTEGERS}
+    reals = {name: count for name, count in counts.items() if name not in INTEGERS}
+    return _packed(counts, True) if mixed else _packed(reals, False) + _packed(integers, False)
+
+
+def line_of(mixed: bool) -> int:
+    """Numbers that are written at once at most."""
+    return LINE // (4 if mixed else 8)
+
+
+def width_of(record: tuple[str, ...], counts: Mapping[str, int], mixed: bool) -> int:
+    """Numbers of a record, those that fill it up included: a power of two, or whole lines."""
+    numbers, line = sum(counts[name] for name in record), line_of(mixed)
+    return 1 << (numbers - 1).bit_length() if numbers <= line else -(-numbers // line) * line
+
+
+def _packed(counts: Mapping[str, int], mixed: bool) -> list[tuple[str, ...]]:
+    rooms = _rooms(sum(counts.values()), line_of(mixed))
+    records: list[tuple[str, ...]] = [()] * len(rooms)
     for name in sorted(counts, key=lambda name: (-counts[name], name)):
-        for place, record in enumerate(records):
-            room = max(LENGTH, -(-counts[record[0]] // LENGTH) * LENGTH) - sum(
-                counts[other] for other in record
-            )
-            if counts[name] <= room and (mixed or (name in INTEGERS) == (record[0] in INTEGERS)):
-                records[place] = (*record, name)
-                break
-        else:
-            records.append((name,))
-    return records
+        if not any(room >= counts[name] for room in rooms):
+            rooms.append(width_of((name,), counts, mixed))
+            records.append(())
+        place = next(place for place, room in enumerate(rooms) if room >= counts[name])
+        records[place] = (*records[place], name)
+        rooms[place] -= counts[name]
+    return [record for record in records if record]
 
 
-def width_of(record: tuple[str, ...], counts: Mapping[str, int]) -> int:
-    """Numbers of a record, those that fill it up included."""
-    numbers = sum(counts[name] for name in record)
-    return numbers if numbers <= 2 else -(-numbers // LENGTH) * LENGTH
+def _rooms(numbers: int, line: int) -> list[int]:
+    """Widths of records for so many numbers: powers of two, which stay empty by one number at most."""
+    rooms = []
+    while numbers > 0:
+        wanted = min(line, numbers + (numbers > 2))
+        rooms.append(1 << (wanted.bit_length() - 1))
+        numbers -= rooms[-1]
+    return rooms
 
 
 def scattered(
@@ -62,17 +82,19 @@ def scattered(
     `index` (n,): the place of a lane's pixel. Each pixel is written by the one lane that owns it: no atomics.
     """
     counts = {name: len(components) for name, components in values.items()}
+    mixed = backend.precision == "single"
+    line = line_of(mixed)
     arrays = {}
-    for record in records_of(counts, backend.precision == "single"):
-        reals = backend.precision == "single" or record[0] not in INTEGERS
+    for record in records_of(counts, mixed):
+        reals = mixed or record[0] not in INTEGERS
         word, packet = (backend.Float, backend.FloatN) if reals else (backend.UInt32, backend.IdN)
-        width = width_of(record, counts)
+        width = width_of(record, counts, mixed)
         numbers = [_as(word, component) for name in record for component in values[name]]
         numbers += [word(0)] * (width - len(numbers))
         arrays[key_of(record)] = target = dr.empty(word, pixels * width)
-        for first in range(0, width, LENGTH):
-            part = numbers[first : first + LENGTH]
-            place = index * (width // len(part)) + first // LENGTH
+        for first in range(0, width, line):
+            part = numbers[first : first + line]
+            place = index * (width // len(part)) + first // line
             value = packet(*part) if len(part) > 1 else part[0]
             dr.scatter(target, value, place, active, mode=dr.ReduceMode.Permute)
     return arrays
@@ -82,7 +104,7 @@ def taken_apart(arrays: Mapping[str, NDArray], counts: Mapping[str, int], mixed:
     """The values (pixels, components) in arrays that `scattered` has written, by name; nothing is copied."""
     values = {}
     for record in records_of(counts, mixed):
-        rows = arrays[key_of(record)].reshape(-1, width_of(record, counts))
+        rows = arrays[key_of(record)].reshape(-1, width_of(record, counts, mixed))
         first = 0
         for name in record:
             part = rows[:, first : first + counts[name]]

@@ -14,31 +14,42 @@ from tests.accuracy import worlds
 from tracer.aovs import NAMES
 from tracer.backends import find_backend
 from tracer.film.layout import INTEGERS
-from tracer.pixel_records import PLAIN, components_of, key_of, records_of, scattered, taken_apart, width_of
+from tracer.pixel_records import (
+    PLAIN,
+    components_of,
+    key_of,
+    line_of,
+    records_of,
+    scattered,
+    taken_apart,
+    width_of,
+)
 
 
 def test_vectors_take_numbers_along() -> None:
     assert records_of(PLAIN, True) == records_of(PLAIN, False) == [("color", "alpha"), ("depth", "z")]
     counts = components_of(["normal", "shape", "level"], 1)
-    assert records_of(counts, True) == [("color", "alpha"), ("normal", "depth"), ("level", "shape", "z")]
-    assert records_of(counts, False) == [("color", "alpha"), ("normal", "depth"), ("level", "shape"), ("z",)]
+    assert records_of(counts, True) == [("color", "normal", "alpha", "depth"), ("level", "shape", "z")]
+    assert records_of(counts, False) == [("color", "normal", "alpha", "depth"), ("z",), ("level", "shape")]
+    everything = components_of(NAMES, 3)
+    assert [width_of(record, everything, True) for record in records_of(everything, True)] == [16, 16, 8]
 
 
-@pytest.mark.parametrize("lights", [1, 3, 4, 5, 9])
+@pytest.mark.parametrize("lights", [1, 3, 4, 5, 9, 17, 40])
 def test_nothing_is_lost_and_little_is_filled_up(lights: int) -> None:
     for number, mixed in itertools.product((0, 1, 3, len(NAMES)), (True, False)):
         counts = components_of(NAMES[:number], lights)
-        records = records_of(counts, mixed)
+        records, line = records_of(counts, mixed), line_of(mixed)
         assert sorted(itertools.chain(*records)) == sorted(counts)
-        widths = [width_of(record, counts) for record in records]
-        assert all(width in (1, 2) or width % 4 == 0 for width in widths)
+        widths = [width_of(record, counts, mixed) for record in records]
+        assert all(width in (1, 2, 4, 8) or width % line == 0 for width in widths)
         assert sum(widths) <= 1.34 * sum(counts.values())
         if not mixed:
             assert all(len({name in INTEGERS for name in record}) == 1 for record in records)
 
 
 @pytest.mark.parametrize("precision", ["single", "double"])
-@pytest.mark.parametrize("lights", [1, 5])
+@pytest.mark.parametrize("lights", [1, 5, 20])
 def test_lanes_write_what_is_read(precision: str, lights: int) -> None:
     backend, pixels = find_backend("llvm", precision), 37
     counts = components_of(NAMES, lights)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from tracer.errors import OutputError, SceneError
 from tracer.film.atomic import atomic_write
+from tracer.film.row_blocks import copy_together
 from tracer.native_output import captured_stderr
 
 Window: TypeAlias = tuple[int, int, int, int]
@@ -59,7 +60,7 @@ def write_exr(
         "dataWindow": _inclusive(window),
         "displayWindow": _inclusive(display_window or window),
     }
-    pixels = {name: _pixels(name, array, half_color) for name, array in channels.items()}
+    pixels = _contiguous(channels, half_color)
     _use_all_cores()
     with atomic_write(path) as temporary:
         try:
@@ -88,13 +89,21 @@ def read_exr(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray], dict[str
     return channels, header
 
 
-def _pixels(name: str, array: NDArray, half_color: bool) -> NDArray:
-    """A contiguous copy or view in the file's type; the package reads strided arrays wrongly."""
-    if np.issubdtype(array.dtype, np.integer):
-        return np.ascontiguousarray(array.astype(np.uint32, copy=False))
-    if half_color and name in COLOR_CHANNELS:
-        return np.ascontiguousarray(np.clip(array, -HALF_MAX, HALF_MAX).astype(np.float16))
-    return np.ascontiguousarray(array, dtype=np.float32)
+def _contiguous(channels: Mapping[str, NDArray], half_color: bool) -> dict[str, NDArray]:
+    """The channels in the file's types, without gaps, copied where they are not so already; the package reads
+    strided arrays wrongly."""
+    found: dict[str, NDArray] = {}
+    copies = []
+    for name, array in channels.items():
+        kind: Any = np.uint32 if np.issubdtype(array.dtype, np.integer) else np.float32
+        if half_color and name in COLOR_CHANNELS:
+            array, kind = np.clip(array, -HALF_MAX, HALF_MAX), np.float16
+        found[name] = array
+        if array.dtype != kind or not array.flags.c_contiguous:
+            found[name] = np.empty(array.shape, kind)
+            copies.append((found[name], array))
+    copy_together(copies)
+    return found
 
 
 def _attribute(value: HeaderValue) -> HeaderValue:
