@@ -28,7 +28,7 @@ from tracer.scene import Scene
 from tracer.shafts import Enclosure
 from tracer.shapes import Plane, ShapeRecord, Sphere
 from tracer.shapes.sphere import SphereSlot
-from tracer.shapes.sphere_table import SphereTable
+from tracer.shapes.sphere_table import SphereRows, SphereTable
 from tracer.shapes.triangles import PlacedMesh
 from tracer.textures.tables import PackedTexture, TextureTables
 
@@ -72,10 +72,11 @@ class DeviceScene:
     """A scene in Dr.Jit memory, for one backend and precision.
 
     `slots`: planes and spheres that stand in the kernel one by one, in the order of the shapes;
-    `sphere_table`: all spheres when they are many; `triangles`: those of all meshes; `enclosures`: balls
-    around the meshes. Tables by shape, in packets of four: `geometry` (plane n, d or sphere center, radius),
-    `ids` (shape kind times 256 plus texture flags, first color, count of colors, plane bit), `surfaces`
-    (ior, k_r, k_t, k_a; m, h, s, texture rate), `object_space` (the 3x4 matrix back), `first_primitive` (one
+    `sphere_rows`: these spheres once more, as a table; `sphere_table`: all spheres when they are many;
+    `triangles`: those of all meshes; `enclosures`: balls around the meshes. Tables by shape, in packets of
+    four: `geometry` (plane n, d or sphere center, radius), `ids` (shape kind times 256 plus texture flags,
+    first color, count of colors, plane bit), `surfaces` (ior, k_r, k_t, k_a; m, h, s, texture rate),
+    `object_space` (the 3x4 matrix back), `first_primitive` (one
     each). By primitive, when there are meshes: `shape_of`, and `slot_of` its triangle in the hierarchy.
     """
 
@@ -83,6 +84,7 @@ class DeviceScene:
     options: Options
     kinds: frozenset[int]
     slots: list[Any]
+    sphere_rows: SphereRows | None
     sphere_table: SphereTable | None
     triangles: TriangleTables | None
     enclosures: list[Enclosure]
@@ -133,7 +135,7 @@ def _compiled(scene: Scene, backend: Backend) -> DeviceScene:
     rows = _geometry_rows(scene)
     host = HostScene(first, meshes, _extent(scene, rows, meshes))
     decode = decode_srgb if scene.color_space == "linear" else np.asarray
-    slots, sphere_table, planes = _analytic_shapes(scene, backend, rows, first)
+    slots, sphere_rows, sphere_table, planes = _analytic_shapes(scene, backend, rows, first)
     tables = compile_meshes(scene, backend, meshes, first)
     textures = compile_textures(scene, backend)
     return DeviceScene(
@@ -146,6 +148,7 @@ def _compiled(scene: Scene, backend: Backend) -> DeviceScene:
         ),
         kinds=frozenset(_kind(shape) for shape in scene.shapes),
         slots=slots,
+        sphere_rows=sphere_rows,
         sphere_table=sphere_table,
         triangles=tables.triangles,
         enclosures=tables.enclosures,
@@ -194,7 +197,7 @@ def _kind(shape: ShapeRecord) -> int:
 
 def _analytic_shapes(
     scene: Scene, backend: Backend, rows: np.ndarray, first: np.ndarray
-) -> tuple[list[Any], SphereTable | None, np.ndarray]:
+) -> tuple[list[Any], SphereRows | None, SphereTable | None, np.ndarray]:
     """Planes and spheres for the kernel, and the rows (n, d) of the planes that have bits."""
     spheres = [i for i, shape in enumerate(scene.shapes) if isinstance(shape, Sphere)]
     many = len(spheres) > UNROLLED_SPHERES
@@ -206,7 +209,8 @@ def _analytic_shapes(
         if isinstance(shape, Plane):
             planes.append(i)
     table = SphereTable.of(backend, rows[spheres], first[spheres]) if many else None
-    return slots, table, rows[planes[:SIDE_BITS]]
+    few = SphereRows.of(backend, rows[spheres], first[spheres]) if spheres and not many else None
+    return slots, few, table, rows[planes[:SIDE_BITS]]
 
 
 def _geometry_rows(scene: Scene) -> np.ndarray:

@@ -7,6 +7,7 @@ knows where its rays come from.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -169,25 +170,23 @@ def _geometry_at(
     """Points moved onto their surfaces along the normal, and the outward unit normals there."""
     backend = scene.backend
     row = dr.gather(backend.Vector4, scene.geometry, shape, active)
-    point, normal = p, backend.Vector3(0, 0, 1)
+    point, normal = p, dr.zeros(backend.Vector3, dr.width(p))
     for analytic, surface in ANALYTIC_SURFACES.items():
         if analytic in scene.kinds:
-            p_k, n_k = surface(row, p)
-            point, normal = dr.select(kind == analytic, p_k, point), dr.select(kind == analytic, n_k, normal)
+            on_shape = partial(lambda _, surface: surface(row, p), surface=surface)
+            point, normal = changed_where(
+                active & (kind == analytic), (point, normal), on_shape, label="on a shape"
+            )
     if scene.triangles is not None:
         tables = scene.triangles.rows
 
-        def on_triangle(point: Any, normal: Any) -> tuple[Any, Any]:
+        def on_triangle(_: Any) -> tuple[Any, Any]:
             triangle = gather_triangle(backend, tables, slot_of(scene, primitive, True))
             height = dr.dot(triangle.normal, p - triangle.v0)
             return dr.fma(-height, triangle.normal, p), triangle.normal
 
-        point, normal = dr.if_stmt(
-            args=(point, normal),
-            cond=active & (kind == MESH),
-            true_fn=on_triangle,
-            false_fn=lambda point, normal: (point, normal),
-            label="on a triangle",
+        point, normal = changed_where(
+            active & (kind == MESH), (point, normal), on_triangle, label="on a triangle"
         )
     return point, normal
 

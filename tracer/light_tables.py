@@ -16,9 +16,9 @@ from tracer.lights import LightRecord
 from tracer.random import JITTER_STREAM, fraction, philox
 from tracer.shafts import Ball, ball_around
 
-UNROLLED_LIGHTS, UNROLLED_SAMPLES = 16, 32
-"""Up to so many lights with so many samples in all stand in the kernel one by one; more are looped over,
-which takes twice as long. One bit a sample must fit a word; 16 lights take half a second to compile."""
+UNROLLED = 32
+"""So many samples of all lights stand in the kernel one by one; more are looped over, which takes twice as
+long. One bit a sample must fit a word; 32 lights take a second to compile."""
 
 ROW = 16
 """Floats of a sample: base (3), A (3), first, B (3), second, color times share of the light (3), its part of
@@ -102,7 +102,7 @@ def compile_lights(
     sides, decided = _plane_bits(table[:, :3], planes, backend)
     count = sum(map(len, blocks))
     jitters = any(getattr(light, "jitter", False) for light in lights)
-    few = len(blocks) <= UNROLLED_LIGHTS and count <= UNROLLED_SAMPLES and not jitters
+    few = count <= UNROLLED and not jitters
     return LightTables(
         rows=backend.table(table),
         kinds=backend.id_table(np.concatenate(kinds) if kinds else [0]),

@@ -8,6 +8,7 @@ from typing import Any
 import drjit as dr
 
 from tracer.acceleration.traverse import Fold, visit_some, visit_triangles
+from tracer.bits import masks_in_word
 from tracer.branches import changed_where
 from tracer.device_scene import DeviceScene
 from tracer.intersection import Surface, departure_to_light, shape_of
@@ -38,15 +39,27 @@ def hidden_by_sphere(
     scene: DeviceScene, segment: Segment, active: Any, suspects: Suspects | None = None
 ) -> Any:
     """Mask: a sphere that stands in the kernel (and is suspect) lies strictly between the two ends."""
-    blocked = dr.full(scene.backend.Bool, False, dr.width(segment.length))
-    for number, slot in enumerate(scene.spheres):
-        if suspects is None:
-            blocked = blocked | slot.blocks(segment, active)
-        else:
-            asked = active & ~blocked & ((suspects.spheres & (1 << number)) != 0)
-            blocks = partial(lambda blocked, slot: slot.blocks(segment, True), slot=slot)
-            blocked = changed_where(asked, blocked, blocks, label="suspect")
-    return blocked & active
+    backend, rows = scene.backend, scene.sphere_rows
+    nothing = dr.full(backend.Bool, False, dr.width(segment.length))
+    if rows is None:
+        return nothing
+    if suspects is None:
+        word = masks_in_word(backend, [slot.may_block(segment, backend.epsilon) for slot in scene.spheres])
+    else:
+        word = suspects.spheres
+
+    def body(todo: Any, blocked: Any) -> tuple[Any, Any]:
+        blocked = rows.fetch(dr.tzcnt(todo)).blocks(segment, True)
+        return dr.select(blocked, 0, todo & (todo - 1)), blocked
+
+    # Most packets pass it by. Branches in its place, one for each sphere and light, take long to compile.
+    _, blocked = dr.while_loop(
+        state=(dr.select(active, word, 0), nothing),
+        cond=lambda todo, _: todo != 0,
+        body=body,
+        label="suspects",
+    )
+    return blocked
 
 
 def hidden_by_many(

@@ -8,6 +8,7 @@ from typing import Any
 import drjit as dr
 
 from tracer.arrival import Finish
+from tracer.branches import changed_where
 from tracer.device_scene import DeviceScene
 from tracer.intersection import Surface, leave
 from tracer.path import make_path
@@ -71,8 +72,13 @@ def spawn(
 ) -> Children:
     """The children at a hit; `base` (3, n) is the throughput of the parent times own color times (1 - a)."""
     ray: Ray = path.ray
-    through, total = refract_direction(ray.d, surface.normal, material.ior, surface.entering)
     k_r, k_t = material.reflection, material.refraction
+    through, total = changed_where(
+        active & (k_t > 0),
+        (ray.d, dr.full(scene.backend.Bool, False, dr.width(ray.d))),
+        lambda _: refract_direction(ray.d, surface.normal, material.ior, surface.entering),
+        label="refraction",
+    )
     total = active & total & (k_t > 0)
     wants_mirror = active & (k_r > 0)
     wants_through = active & (k_t > 0) & (True if scene.options.tir_reflects else ~total)

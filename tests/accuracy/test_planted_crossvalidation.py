@@ -21,7 +21,7 @@ from tracer import canvas as canvas_module
 from tracer import device_scene, intersection, light_tables, queries
 from tracer.canvas import DeviceCanvas
 from tracer.material import Material
-from tracer.ray import Hit, Ray
+from tracer.ray import Hit, Ray, keep_nearer
 from tracer.shapes import Plane, Sphere, sphere
 from tracer.shapes.sphere import SphereSlot
 
@@ -198,15 +198,14 @@ def triangle_lost_for_all(patch: pytest.MonkeyPatch) -> None:
 
 def sphere_met_again_from_inside(patch: pytest.MonkeyPatch) -> None:
     """A share of the rays inside a sphere meets it again at once."""
-    true = SphereSlot.hit
+    true = SphereSlot.closest
 
-    def again(slot: SphereSlot, ray: Ray) -> tuple[Any, Any]:
-        t, valid = true(slot, ray)
+    def again(slot: SphereSlot, ray: Ray, hit: Hit, active: Any) -> Hit:
         x = ray.o.x * 1e5
         own = ray.leaves(slot.primitive) & ray.inside & (x - dr.floor(x) < 0.02)
-        return dr.select(own, 1e-7 * slot.radius, t), valid
+        return keep_nearer(true(slot, ray, hit, active), 1e-7 * slot.radius, own, slot.primitive)
 
-    patch.setattr(SphereSlot, "hit", again)
+    patch.setattr(SphereSlot, "closest", again)
 
 
 def bent_by_index_1(patch: pytest.MonkeyPatch) -> None:

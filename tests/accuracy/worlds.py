@@ -274,8 +274,8 @@ def _lamps(count: int) -> Table:
     lamps = []
     for k in range(count):
         angle = 0.37 + 2.4 * k
-        position = [3.1 * np.cos(angle), 5.3 + 0.11 * k, 2.2 + 2.7 * np.sin(angle)]
-        color = [1.0, 1 - 0.03 * k, 0.4 + 0.03 * k]
+        position = [3.1 * np.cos(angle), 5.3 + 0.06 * k, 2.2 + 2.7 * np.sin(angle)]
+        color = [1.0, 1 - 0.02 * k, 0.3 + 0.02 * k]
         lamps.append({"kind": "point", "position": position, "color": color, "weight": 1.0 + k % 3})
     return room(lights=lamps)
 
@@ -284,7 +284,7 @@ FEATURES: dict[str, Callable[[], Table]] = {
     "room": room,
     "no lights": lambda: room(lights=[]),
     "lights in the kernel": lambda: _lamps(7),
-    "lights in a table": lambda: _lamps(19),
+    "lights in a table": lambda: _lamps(33),
     "weight zero": lambda: room(
         lights=[*POINT_LIGHTS, {"kind": "point", "position": [0, 3, 3], "weight": 0.0}]
     ),

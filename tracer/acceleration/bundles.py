@@ -46,14 +46,6 @@ def neighboring_points(backend: Backend, points: Any, bundle: Any) -> list[Any]:
     return [backend.Vector3(*point) for point in zip(*components, strict=True)]
 
 
-def masks_in_word(backend: Backend, masks: list[Any]) -> Any:
-    """Bit k of a word (n,) is mask k (n,)."""
-    word = backend.UInt32(0)
-    for k, mask in enumerate(masks):
-        word = dr.select(mask, word | (1 << k), word)
-    return word
-
-
 @dataclass
 class Found:
     """What n bundles found: the `answers` to their rays (RAYS n,). Those with a bit in `open` (n,) need more:

@@ -13,11 +13,12 @@ from typing import Any
 import drjit as dr
 
 from tracer.acceleration.bundle_tests import Cones, SeenTriangle
-from tracer.acceleration.bundles import RAYS, Found, masks_in_word
+from tracer.acceleration.bundles import RAYS, Found
 from tracer.acceleration.candidates import Candidates
 from tracer.acceleration.triangle import TriangleTables, fetch_triangle, largest_slack
 from tracer.acceleration.walk import walk
 from tracer.backends import Backend
+from tracer.bits import masks_in_word
 from tracer.branches import changed_where
 from tracer.ray import largest, max_abs, select_max, smallest
 

@@ -25,14 +25,43 @@ counts twice on the way to the other side. The planes of a box round by 11."""
 
 
 @dataclass
-class SphereTable:
-    """All spheres of a scene in Dr.Jit memory, in the order of the leaves: `rows`, 4 floats each (center,
-    radius), `margins` and `primitives`, one each; `lists`: the hierarchy over them; `ball`: holds all."""
+class SphereRows:
+    """Spheres in Dr.Jit memory: `rows`, 4 floats each (center, radius), `margins` and `primitives`, one
+    each."""
 
     backend: Backend
     rows: Any
     margins: Any
     primitives: Any
+
+    @staticmethod
+    def of(backend: Backend, rows: np.ndarray, primitives: np.ndarray) -> SphereRows:
+        """Of n >= 1 spheres with `rows` (n, 4) and their primitive ids."""
+        return SphereRows(
+            backend=backend,
+            rows=backend.table(rows),
+            margins=backend.table([contact_margin(row, backend.epsilon) for row in rows]),
+            primitives=backend.id_table(primitives),
+        )
+
+    def fetch(self, slot: Any) -> SphereSlot:
+        """The sphere in a row."""
+        row = dr.gather(self.backend.Vector4, self.rows, slot)
+        return SphereSlot(
+            center=self.backend.Vector3(row.x, row.y, row.z),
+            radius=row.w,
+            margin=dr.gather(self.backend.Float, self.margins, slot),
+            primitive=dr.gather(self.backend.UInt32, self.primitives, slot),
+        )
+
+
+@dataclass
+class SphereTable:
+    """All spheres of a scene, in the order of the leaves; `lists`: the hierarchy over them; `ball`: holds
+    all."""
+
+    backend: Backend
+    spheres: SphereRows
     lists: NodeLists
     ball: Ball
 
@@ -41,12 +70,9 @@ class SphereTable:
         """The table of n >= 1 spheres with `rows` (n, 4) and their primitive ids."""
         lower, upper = sphere_boxes(rows.astype(backend.dtype))
         tree = build_over_boxes(backend, lower, upper)
-        rows, primitives = rows[tree.order], primitives[tree.order]
         return SphereTable(
             backend=backend,
-            rows=backend.table(rows),
-            margins=backend.table([contact_margin(row, backend.epsilon) for row in rows]),
-            primitives=backend.id_table(primitives),
+            spheres=SphereRows.of(backend, rows[tree.order], primitives[tree.order]),
             lists=threaded(backend, tree),
             ball=Ball.of(backend, ball_around(_corners(lower, upper), backend.epsilon)),
         )
@@ -112,13 +138,7 @@ class SphereTable:
 
     def fetch(self, slot: Any) -> SphereSlot:
         """The sphere in a slot of the hierarchy."""
-        row = dr.gather(self.backend.Vector4, self.rows, slot)
-        return SphereSlot(
-            center=self.backend.Vector3(row.x, row.y, row.z),
-            radius=row.w,
-            margin=dr.gather(self.backend.Float, self.margins, slot),
-            primitive=dr.gather(self.backend.UInt32, self.primitives, slot),
-        )
+        return self.spheres.fetch(slot)
 
 
 def sphere_boxes(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

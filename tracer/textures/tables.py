@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import drjit as dr
 import numpy as np
 
 from tracer.backends import Backend
+from tracer.branches import changed_where
 from tracer.textures.affine_image import AffineImage
 from tracer.textures.base import CellTexture, PictureTexture, TextureRecord
 from tracer.textures.cells import CellRule, modulo
@@ -153,13 +155,15 @@ def texture_color(backend: Backend, tables: TextureTables, row: TextureRow, p: A
     """Colors (3, n) of points p (3, n), in the color space of the shading."""
     truncate = row.has(TRUNCATE) if tables.flags & TRUNCATE else False
     rule = CellRule(backend, truncate)
-    number = backend.UInt32(0)
-    if STRIPES in tables.kinds:
-        cell = stripe_number(rule, p, row.rate, backend.Float(row.count))
-        number = dr.select(row.kind == STRIPES, backend.UInt32(cell), number)
-    if CHECKER in tables.kinds:
-        cell = checker_number(rule, p, row.rate)
-        number = dr.select(row.kind == CHECKER, backend.UInt32(cell), number)
+    cells = {
+        STRIPES: lambda: stripe_number(rule, p, row.rate, backend.Float(row.count)),
+        CHECKER: lambda: checker_number(rule, p, row.rate),
+    }
+    number = dr.zeros(backend.UInt32, dr.width(active))
+    for kind, cell in cells.items():
+        if kind in tables.kinds:
+            of_cell = partial(lambda _, cell: backend.UInt32(cell()), cell=cell)
+            number = changed_where(active & (row.kind == kind), number, of_cell, label="cell")
     if PICTURE not in tables.kinds:
         return _entry(backend, tables, row.first + number, active)
     is_picture = active & (row.kind == PICTURE)
