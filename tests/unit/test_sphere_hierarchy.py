@@ -187,7 +187,7 @@ def one_after_the_other(
     table: SphereTable, ray: Ray, limit: Any, state: Any, active: Any, step: Any, done: Any = None
 ) -> Any:
     """In place of `SphereTable._visit`: all spheres, no boxes."""
-    n = table.backend.opaque_id(dr.width(table.primitives))
+    n = table.backend.opaque_id(dr.width(table.spheres.primitives))
     slot = dr.select(active, dr.zeros(table.backend.UInt32, dr.width(active)), n)
     _, state = dr.while_loop(
         state=(slot, state),
