@@ -7,7 +7,6 @@ import os
 import re
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -70,13 +69,10 @@ def assert_refused(done: subprocess.CompletedProcess[str], message: str, code: i
     assert done.returncode == code
 
 
-def test_help_is_quick_and_needs_no_dr_jit(tracer: Run) -> None:
-    started = time.perf_counter()
+def test_help_does_not_wait_for_dr_jit(tracer: Run) -> None:
     done = tracer("--help")
-    seconds = time.perf_counter() - started
     assert done.returncode == 0
     assert "tracer render room" in done.stdout
-    assert seconds < 1.5, "0.15 s on a quiet machine; Dr.Jit alone would take longer"
     imported = subprocess.run(
         [sys.executable, "-X", "importtime", *COMMAND[1:], "--help"], capture_output=True
     )

@@ -9,7 +9,6 @@ import shlex
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -245,10 +244,8 @@ def test_what_was_finished_is_kept_when_it_is_stopped(
     for _ in range(3):
         assert json.loads(process.stderr.readline())["done"] > 0
     process.send_signal(signal.SIGINT)
-    started = time.monotonic()
     output, talk = process.communicate(timeout=60)
     assert (process.returncode, output) == (130, "")
-    assert time.monotonic() - started < 30
     assert "tracer: interrupted: report/index.partial.html holds what was finished" in talk
     assert "The run was stopped after" in (tmp_path / "report" / "index.partial.html").read_text()
     assert not (tmp_path / "report" / "index.html").exists()
