@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.system.under_way import finish, start
+from tests.system.under_way import AT_ONCE, finish, start
 
 ADAPTIVE = ("--supersample", "adaptive")
 PLACE = ("--resolution", "320", "240")
@@ -64,7 +64,7 @@ def test_after_ctrl_c_the_picture_is_completed(repository: Path, tmp_path: Path)
     whole.mkdir()
     broken.mkdir()
     assert finish(start(repository, whole, *command)) == (0, "")
-    process = start(repository, broken, *command)
+    process = start(repository, broken, *command, begin=AT_ONCE)
     while not (broken / "x.work").exists():
         assert process.poll() is None, "it was over before anything was kept"
         time.sleep(0.01)

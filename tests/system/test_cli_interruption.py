@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from tracer.cli.interruption import SAME_REQUEST
 from tracer.film.result import load_picture_file
 
 pytestmark = [
@@ -24,6 +25,9 @@ pytestmark = [
 
 SLOW = ("--resolution", "256", "192", "--supersample", "64", "--threads", "1", "--set", "lights.0.samples=64")
 """96 bands of 64 x 8 pixels, of more than a second each."""
+
+LONGER = ("--set", "lights.0.samples=192")
+"""Bands of thrice that time, in which there is room for two signals on a faster machine as well."""
 
 
 @contextmanager
@@ -76,10 +80,13 @@ def test_the_finished_rows_are_kept_beside_the_picture(
 
 
 def test_a_second_one_ends_the_process_in_the_middle_of_a_kernel(repository: Path, tmp_path: Path) -> None:
-    with slow_render(repository, tmp_path) as process:
+    with slow_render(repository, tmp_path, *LONGER) as process:
         process.send_signal(signal.SIGINT)
-        time.sleep(0.4)
+        assert process.stderr is not None
+        while "once more quits at once" not in process.stderr.readline():
+            assert process.poll() is None
+        time.sleep(1.2 * SAME_REQUEST)
         process.send_signal(signal.SIGINT)
-        process.communicate(timeout=10)
+        process.communicate(timeout=60)
     assert process.returncode == 130
     assert not (tmp_path / "x.partial.png").exists(), "the first alone would have left it"

@@ -9,7 +9,6 @@ import re
 import signal
 import subprocess
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -27,7 +26,7 @@ OPTIONS = (
     "256",
     "256",
     "--supersample",
-    "16",
+    "10",
     "--threads",
     "1",
     "--aov",
@@ -35,23 +34,23 @@ OPTIONS = (
     "--stats",
     "--aov-png",
 )
-"""A picture of a few seconds in bands of 32 rows, with two pictures of layers."""
+"""A picture of a second or two, with two pictures of layers."""
 
 VARIES = ("seconds", "kernels", "peak_memory")
 """Statistics that are those of a run, not of the picture."""
 
 BAND = 256 * 32 * 36
-"""Bytes of a band: color, coverage, depth, z and normal in single precision."""
+"""Bytes of a band of 32 rows: color, coverage, depth, z and normal in single precision."""
 
-EAGER = """
+IN_BANDS = """
 from functools import partial
 from tracer import cli, kept_bands
 from tracer.cli import pictures
 kept_bands.PATIENCE = 0
-pictures.render = partial(pictures.render, rays_per_band=256 * 8 * 16**2)
+pictures.render = partial(pictures.render, rays_per_band=256 * {rows} * 10**2)
 cli.main()
 """
-"""The command, with bands of 8 rows, which are kept from the first one on, not from the second second."""
+"""The command, in bands that are kept from the first one on, however fast the machine is."""
 
 RENDER = ("render", "classic", "-o", "x.png", "-o", "x.exr")
 
@@ -60,10 +59,11 @@ def start(
     repository: Path,
     folder: Path,
     *options: str,
-    begin: Sequence[str] = under_way.COMMAND,
+    rows: int = 32,
     largest: int | None = None,
 ) -> subprocess.Popen[str]:
-    """The render under way, with more options."""
+    """The render under way, with more options, in bands of so many rows."""
+    begin = ("-c", IN_BANDS.format(rows=rows))
     return under_way.start(repository, folder, *RENDER, *OPTIONS, *options, begin=begin, largest=largest)
 
 
@@ -109,8 +109,8 @@ def whole_records(file: Path) -> int:
 
 
 def finished_bands(talk: str) -> int:
-    """How many records must be in the work file, by what a killed `EAGER` told: one for the settings, and one
-    for each finished band."""
+    """How many records must be in the work file, by what a killed run in bands of 8 rows told: one for the
+    settings, and one for each finished band."""
     told = [json.loads(line)["done"] for line in talk.splitlines() if line.endswith("}")]
     return 1 + told[-1] // (256 * 8) if told else 0
 
@@ -154,7 +154,7 @@ def test_nothing_is_lost_whenever_it_is_killed(
     kills = 0
     kept = 0
     while kills < KILLS:
-        process = start(repository, tmp_path, "--resume", "--progress", "json", begin=("-c", EAGER))
+        process = start(repository, tmp_path, "--resume", "--progress", "json", rows=8)
         assert process.stderr is not None
         first = process.stderr.readline()  # it has begun to trace
         try:

@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 COMMAND = ("-m", "tracer.cli")
+AT_ONCE = ("-c", "from tracer import cli, kept_bands; kept_bands.PATIENCE = 0; cli.main()")
+"""The command, which keeps bands from the first one on, however fast the machine is."""
 
 
 def start(
