@@ -46,7 +46,7 @@ def hidden_by_sphere(
     if suspects is None:
         word = masks_in_word(backend, [slot.may_block(segment, backend.epsilon) for slot in scene.spheres])
     else:
-        word = suspects.spheres
+        word = suspects.spheres & ((1 << len(scene.spheres)) - 1)  # everybody may be more than there are
 
     def body(todo: Any, blocked: Any) -> tuple[Any, Any]:
         blocked = rows.fetch(dr.tzcnt(todo)).blocks(segment, True)
