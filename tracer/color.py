@@ -15,6 +15,8 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tracer.row_blocks import copy_pixels
+
 # Values worked on at a time: a band in double precision stays in the cache, whatever the size of the picture.
 BAND = 1 << 16
 
@@ -57,24 +59,15 @@ def quantize(display: ArrayLike, bits: int = 8) -> NDArray[np.unsignedinteger]:
     values, whole = np.atleast_1d(source), np.atleast_1d(result)
     rows = max(1, BAND * len(values) // max(1, values.size))
     for start in range(0, len(values), rows):
-        part = _as_doubles(values[start : start + rows])
+        band = values[start : start + rows]
+        part = np.empty(band.shape)
+        copy_pixels(part, band)
         part *= top
         part += 0.5
         np.fmax(part, 0, out=part)  # unlike `maximum`, answers 0 for NaN
         np.fmin(part, top, out=part)
         whole[start : start + rows] = part  # the conversion drops the fraction: floor, as nothing is negative
     return result
-
-
-def _as_doubles(values: NDArray) -> NDArray[np.float64]:
-    """A copy. Pixels that do not lie end to end share their records with other layers; NumPy copies their few
-    components in less time one after the other."""
-    if values.ndim < 3 or values.flags.c_contiguous:
-        return values.astype(np.float64)
-    copy = np.empty(values.shape)
-    for k in range(values.shape[-1]):
-        copy[..., k] = values[..., k]
-    return copy
 
 
 def _odd(curve: Callable[[NDArray], NDArray], values: ArrayLike) -> NDArray[np.floating]:

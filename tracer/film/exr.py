@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from tracer.errors import OutputError, SceneError
 from tracer.film.atomic import atomic_write
-from tracer.film.row_blocks import copy_together
 from tracer.native_output import captured_stderr
+from tracer.row_blocks import copy_together
 
 Window: TypeAlias = tuple[int, int, int, int]
 HeaderValue: TypeAlias = str | int | float

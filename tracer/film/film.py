@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from tracer.film.layout import VISIBILITY
-from tracer.film.row_blocks import copy_together
+from tracer.row_blocks import copy_together
 from tracer.tiles import Band, Rectangle
 
 BLANK = {"color": 0, "alpha": 0, "depth": -1, "z": np.inf, "shape": -1, "primitive": -1} | dict.fromkeys(

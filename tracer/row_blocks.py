@@ -24,14 +24,17 @@ def copy_together(pairs: Sequence[tuple[NDArray, NDArray]]) -> None:
     for top in range(0, height, rows):
         block = slice(top, top + rows)
         for target, source in pairs:
-            _copy(target[block], source[block])
+            copy_pixels(target[block], source[block])
 
 
-def _copy(target: NDArray, source: NDArray) -> None:
-    """NumPy copies rows of three that do not lie end to end in half the time when it takes one component of
-    all of them after the other."""
-    if source.ndim == 2:
+def copy_pixels(target: NDArray, source: NDArray) -> None:
+    """Copies an array of any shape into another one; numbers are cast as by `astype`.
+
+    Pixels that do not lie end to end share their records with other layers; NumPy copies their few components
+    in less time one after the other.
+    """
+    if source.ndim < 3 or source.flags.c_contiguous:
         target[...] = source
         return
-    for k in range(source.shape[2]):
+    for k in range(source.shape[-1]):
         target[..., k] = source[..., k]
