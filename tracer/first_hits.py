@@ -6,6 +6,7 @@ What else a primary ray meets, and how far all of it is, the loop finds as for o
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -13,7 +14,7 @@ import numpy as np
 
 from tracer.acceleration.bundles import DOUBTFUL, RAYS, Found, answers_to
 from tracer.acceleration.first_of_bundles import HELD, Bundles, nearest_of_bundles
-from tracer.acceleration.traverse import visit_some
+from tracer.acceleration.traverse import visit_triangles
 from tracer.acceleration.triangle import TriangleTables
 from tracer.backends import INVALID
 from tracer.canvas import Canvas, DeviceCanvas
@@ -105,7 +106,7 @@ def nearest_among(scene: DeviceScene, ray: Ray, found: Found, places: Any) -> An
         hit, hoped = state
         return keep_nearer(hit, t, valid, primitive), select_min(dr.select(t > 0, t, hoped), hoped)
 
-    hit, hoped = visit_some(
+    hit, hoped = visit_triangles(
         scene.backend,
         scene.triangles,
         ray,
@@ -114,7 +115,7 @@ def nearest_among(scene: DeviceScene, ray: Ray, found: Found, places: Any) -> An
         limit=lambda state: state[0].t,
         visit=visit,
         active=answered,
-        fold=lambda test, state: found.fold(places, test, state),
+        among=partial(found.fold, places),
     )
     return dr.select(answered & (hit.t <= hoped * HELD), slot_of_hit(scene, hit), DOUBTFUL)
 

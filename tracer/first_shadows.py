@@ -138,13 +138,14 @@ def _blocked(
     sample: LightSample,
     numbers: Any,
     active: Any,
-    fold: Fold | None = None,
+    candidates: Fold | None = None,
 ) -> Any:
-    """Mask: a triangle, of all or of some (`visit_some`), hides the light from what rays meet first."""
+    """Mask: a triangle, of all or of some candidates, hides the light from what rays meet first."""
     known = dr.gather(scene.backend.UInt32, slots, numbers)
     ray, surface, found = _first_surface(scene, canvas, lanes, numbers, known)
     blocked = dr.full(scene.backend.Bool, False, len(numbers))
-    return hidden_by_triangle(scene, segment_to(ray, surface, sample), surface, blocked, active & found, fold)
+    segment = segment_to(ray, surface, sample)
+    return hidden_by_triangle(scene, segment, surface, blocked, active & found, candidates)
 
 
 def _first_surface(

@@ -7,7 +7,7 @@ from typing import Any
 
 import drjit as dr
 
-from tracer.acceleration.traverse import Fold, visit_some, visit_triangles
+from tracer.acceleration.traverse import Fold, visit_triangles
 from tracer.bits import masks_in_word
 from tracer.branches import changed_where
 from tracer.device_scene import DeviceScene
@@ -81,27 +81,23 @@ def hidden_by_triangle(
     surface: Surface,
     blocked: Any,
     active: Any,
-    fold: Fold | None = None,
+    among: Fold | None = None,
 ) -> Any:
-    """Mask: `blocked` already, or a triangle lies strictly between the two ends; `fold`: only some are asked
-    (see `visit_some`)."""
+    """Mask: `blocked` already, or a triangle, of all or `among` some (see `visit_triangles`), lies strictly
+    between the two ends."""
     assert scene.triangles is not None
-    asked = {
-        "departure": lambda: departure_to_light(scene, segment.ray, surface),
-        "state": blocked,
-        "limit": lambda blocked: segment.length,
-        "visit": lambda blocked, _t, _primitive, _test, valid: blocked | valid,
-        "active": active,
-        "light": segment.length,
-    }
-    if fold is not None:
-        return visit_some(scene.backend, scene.triangles, segment.ray, fold=fold, **asked)
     return visit_triangles(
         scene.backend,
         scene.triangles,
         segment.ray,
+        lambda: departure_to_light(scene, segment.ray, surface),
+        state=blocked,
+        limit=lambda blocked: segment.length,
+        visit=lambda blocked, _t, _primitive, _test, valid: blocked | valid,
+        active=active,
+        light=segment.length,
         done=lambda blocked: blocked,
-        **asked,
+        among=among,
     )
 
 

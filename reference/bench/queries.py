@@ -18,7 +18,7 @@ import tracer
 from reference.bench.frames import Check
 from reference.bench.rays import EYE, KINDS, LIGHT, Rays, primary, secondary
 from reference.bench.records import Rate, Series
-from tracer.acceleration.traverse import Fold, visit_some, visit_triangles
+from tracer.acceleration.traverse import Fold, visit_triangles
 from tracer.backends import INVALID, Backend, exact_arithmetic, find_backend
 from tracer.device_scene import compile_scene
 from tracer.intersection import closest_hit, free_ray
@@ -165,11 +165,11 @@ def hidden_neighbors(device: Any, o: Any, light: Any) -> Any:
         dr.eval(found)
         return found
 
-    def blocked(numbers: Any, active: Any, fold: Fold | None = None) -> Any:
+    def blocked(numbers: Any, active: Any, candidates: Fold | None = None) -> Any:
         p = dr.gather(type(o), o, numbers)
         length = reach(p)
         ray = free_ray(device, p, (light - p) / length)
-        return dr.select(any_triangle(device, ray, length, active, fold), backend.UInt32(HIDDEN), LIT)
+        return dr.select(any_triangle(device, ray, length, active, candidates), backend.UInt32(HIDDEN), LIT)
 
     def among(found: Found, places: Any, numbers: Any) -> Any:
         asked = dr.gather(type(places), found.answers, places) != DOUBTFUL
@@ -183,20 +183,23 @@ def hidden_neighbors(device: Any, o: Any, light: Any) -> Any:
     return answers_to(backend.UInt32, dr.width(o), in_bundles, among, singly) == HIDDEN
 
 
-def any_triangle(device: Any, ray: Ray, length: Any, active: Any, fold: Fold | None = None) -> Any:
-    """Mask: some triangle is hit before `length`; the walk ends with the first. `fold`: see `visit_some`."""
+def any_triangle(device: Any, ray: Ray, length: Any, active: Any, among: Fold | None = None) -> Any:
+    """Mask: some triangle, of all or `among` some (see `visit_triangles`), is hit before `length`; the walk
+    ends with the first."""
     from tracer.intersection import departure
 
-    asked = {
-        "departure": lambda: departure(device, ray),
-        "state": dr.full(device.backend.Bool, False, dr.width(ray.d)),
-        "limit": lambda blocked: length,
-        "visit": lambda blocked, _t, _primitive, _test, valid: blocked | valid,
-        "active": active,
-    }
-    if fold is not None:
-        return visit_some(device.backend, device.triangles, ray, fold=fold, **asked)
-    return visit_triangles(device.backend, device.triangles, ray, done=lambda blocked: blocked, **asked)
+    return visit_triangles(
+        device.backend,
+        device.triangles,
+        ray,
+        lambda: departure(device, ray),
+        state=dr.full(device.backend.Bool, False, dr.width(ray.d)),
+        limit=lambda blocked: length,
+        visit=lambda blocked, _t, _primitive, _test, valid: blocked | valid,
+        active=active,
+        done=lambda blocked: blocked,
+        among=among,
+    )
 
 
 class Embree:

@@ -50,45 +50,35 @@ def visit_triangles(
     active: Any,
     light: Any = None,
     done: Callable[[Any], Any] | None = None,
+    among: Fold | None = None,
 ) -> Any:
     """Calls `visit` for every triangle met, until the walk ends or `done(state)` says so.
 
     `limit(state)`: the distance up to which hits count; `light`: distance of a light at the end of the ray,
     which no triangle hides in whose plane it lies. What only rays that enter the root's box need,
-    `departure()` too, is not computed for packets without one.
+    `departure()` too, is not computed for packets without one. `among`: in place of the walk, takes a state
+    through the tests of the slots of some triangles that are known beforehand, all of them.
     """
+
+    def test_within(slabs: Slabs) -> Test:
+        return _test(backend, tables, ray, slabs, departure(), limit, visit, light)
+
+    if among is not None:
+
+        def visit_some(state: Any) -> Any:
+            return among(test_within(Slabs.of(backend, tables.lists, ray)), state)
+
+        return changed_where(active, state, visit_some, label="some")
+
     slabs = Slabs.of(backend, tables.lists, ray)
 
     def crosses(node: Node, state: Any) -> Any:
         return slabs.crossed(node, limit(state))
 
     def visit_all(state: Any) -> Any:
-        test = _test(backend, tables, ray, slabs, departure(), limit, visit, light)
-        return walk(backend, tables.lists, slabs.octant, crosses, test, state, done)
+        return walk(backend, tables.lists, slabs.octant, crosses, test_within(slabs), state, done)
 
     return within_root(backend, tables.lists, slabs.octant, crosses, active, state, visit_all)
-
-
-def visit_some(
-    backend: Backend,
-    tables: TriangleTables,
-    ray: Ray,
-    departure: Callable[[], Departure],
-    state: Any,
-    limit: Callable[[Any], Any],
-    visit: Visit,
-    active: Any,
-    fold: Fold,
-    light: Any = None,
-) -> Any:
-    """The same for triangles that are known beforehand: `fold` takes a state through the tests of their
-    slots."""
-
-    def visit_them(state: Any) -> Any:
-        slabs = Slabs.of(backend, tables.lists, ray)
-        return fold(_test(backend, tables, ray, slabs, departure(), limit, visit, light), state)
-
-    return changed_where(active, state, visit_them, label="some")
 
 
 def _test(
