@@ -6,6 +6,7 @@ shapes hide, and about points that other rays meet.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -30,6 +31,18 @@ MOST_LIGHTS = 4
 """Each takes 8 bytes a primary ray while it is asked, and 4 from then on."""
 
 
+@dataclass(frozen=True)
+class Question:
+    """From which of the points that the primary rays of a launch meet first is a light hidden? `slots` (lanes
+    n n,): of the triangles that they meet; `sample`: the light's only one."""
+
+    scene: DeviceScene
+    canvas: DeviceCanvas
+    lanes: Lanes
+    slots: Any
+    sample: LightSample
+
+
 def lights_asked(scene: DeviceScene) -> list[UnrolledLight]:
     """The lights whose shadows are found in bundles: the first ones of those with one sample."""
     if scene.triangles is None or scene.lights.unrolled is None or scene.options.transparent_shadows:
@@ -46,13 +59,13 @@ def first_shadows(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, slots:
     points = lit_points(scene, canvas, lanes, slots)
 
     def hidden_from(sample: LightSample, where: list[Any]) -> Any:
-        asked = scene, canvas, lanes, slots, sample
+        question = Question(scene, canvas, lanes, slots, sample)
         return answers_to(
             scene.backend.UInt32,
             len(slots),
             lambda numbers, both: Found(**bundled(scene, sample.position, where, numbers, both)),
-            lambda found, places, numbers: among(*asked, found, places, numbers)["hidden"],
-            lambda numbers: singly(*asked, numbers)["hidden"],
+            lambda found, places, numbers: among(question, found, places, numbers)["hidden"],
+            lambda numbers: singly(question, numbers)["hidden"],
         )
 
     return [
@@ -97,63 +110,35 @@ def bundled(scene: DeviceScene, light: Any, where: list[Any], numbers: Any, both
 
 
 @Program
-def among(
-    scene: DeviceScene,
-    canvas: DeviceCanvas,
-    lanes: Lanes,
-    slots: Any,
-    sample: LightSample,
-    found: Found,
-    places: Any,
-    numbers: Any,
-) -> dict[str, Any]:
-    """The same for the rays with these numbers by the candidates in these places of what bundles found, and
+def among(question: Question, found: Found, places: Any, numbers: Any) -> dict[str, Any]:
+    """The answers to the rays with these numbers by the candidates in these places of what bundles found, and
     `DOUBTFUL` where they do not tell."""
     asked = dr.gather(type(places), found.answers, places) != DOUBTFUL
-    blocked = _blocked(scene, canvas, lanes, slots, sample, numbers, asked, partial(found.fold, places))
-    hidden = dr.select(blocked, scene.backend.UInt32(HIDDEN), LIT)
+    blocked = _blocked(question, numbers, asked, partial(found.fold, places))
+    hidden = dr.select(blocked, question.scene.backend.UInt32(HIDDEN), LIT)
     return {"hidden": dr.select(asked, hidden, DOUBTFUL)}
 
 
 @Program
-def singly(
-    scene: DeviceScene,
-    canvas: DeviceCanvas,
-    lanes: Lanes,
-    slots: Any,
-    sample: LightSample,
-    numbers: Any,
-) -> dict[str, Any]:
+def singly(question: Question, numbers: Any) -> dict[str, Any]:
     """The same for the rays with these numbers, each by itself."""
-    everything = dr.full(scene.backend.Bool, True, len(numbers))
-    blocked = _blocked(scene, canvas, lanes, slots, sample, numbers, everything)
-    return {"hidden": dr.select(blocked, scene.backend.UInt32(HIDDEN), LIT)}
+    backend = question.scene.backend
+    blocked = _blocked(question, numbers, dr.full(backend.Bool, True, len(numbers)))
+    return {"hidden": dr.select(blocked, backend.UInt32(HIDDEN), LIT)}
 
 
-def _blocked(
-    scene: DeviceScene,
-    canvas: DeviceCanvas,
-    lanes: Lanes,
-    slots: Any,
-    sample: LightSample,
-    numbers: Any,
-    active: Any,
-    candidates: Fold | None = None,
-) -> Any:
+def _blocked(question: Question, numbers: Any, active: Any, candidates: Fold | None = None) -> Any:
     """Mask: a triangle, of all or of some candidates, hides the light from what rays meet first."""
-    known = dr.gather(scene.backend.UInt32, slots, numbers)
-    ray, surface, found = _first_surface(scene, canvas, lanes, numbers, known)
+    scene = question.scene
+    known = dr.gather(scene.backend.UInt32, question.slots, numbers)
+    ray, surface, found = _first_surface(scene, question.canvas, question.lanes, numbers, known)
     blocked = dr.full(scene.backend.Bool, False, len(numbers))
-    segment = segment_to(ray, surface, sample)
+    segment = segment_to(ray, surface, question.sample)
     return hidden_by_triangle(scene, segment, surface, blocked, active & found, candidates)
 
 
 def _first_surface(
-    scene: DeviceScene,
-    canvas: DeviceCanvas,
-    lanes: Lanes,
-    number: Any,
-    slot: Any,
+    scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, number: Any, slot: Any
 ) -> tuple[Ray, Surface, Any]:
     """Rays by number, what they meet first, and mask: they meet something."""
     pixels, o, d = numbered_rays(scene.backend, canvas, lanes, number)

@@ -54,17 +54,16 @@ def answers(
         points = first_shadows.lit_points(device, on_device, lanes, slots)
         where = list(points.values())
         (sample,) = first_shadows.lights_asked(device)[0].samples
+        question = first_shadows.Question(device, on_device, lanes, slots, sample)
         bundles = dr.arange(backend.UInt32, lanes.count // RAYS)
         found = []
         for both in (False, True):
             by_bundles = Found(**first_shadows.bundled(device, sample.position, where, bundles, both))
-            by_candidates = first_shadows.among(
-                device, on_device, lanes, slots, sample, by_bundles, numbers, numbers
-            )["hidden"]
+            by_candidates = first_shadows.among(question, by_bundles, numbers, numbers)["hidden"]
             is_open = by_bundles.is_open(numbers)
             found.append(dr.select(is_open, DOUBTFUL, by_bundles.answers).numpy())
             found.append(dr.select(is_open, by_candidates, by_bundles.answers).numpy())
-        alone = first_shadows.singly(device, on_device, lanes, slots, sample, numbers)["hidden"].numpy()
+        alone = first_shadows.singly(question, numbers)["hidden"].numpy()
     return found, alone, where[-1].numpy() > 0
 
 

@@ -93,13 +93,8 @@ class Found:
         bundles = _numbers_where(self.open != 0)
         if len(bundles) == 0:
             return bundles
-        index = type(bundles)
-
-        def place(number: Any) -> Any:
-            return dr.gather(index, bundles, number // RAYS) * RAYS + number % RAYS
-
-        chosen = _numbers_where(self.is_open(place(dr.arange(index, len(bundles) * RAYS))))
-        return place(chosen)
+        chosen = _numbers_where(self.is_open(_all_rays_of(bundles)))
+        return _rays_of(bundles, chosen)
 
     def is_open(self, places: Any) -> Any:
         """Mask (k,): the rays in these places need more."""
@@ -132,7 +127,7 @@ def answers_to(
         found = in_bundles(bundles, both)
         places = found.open_places()
         if len(places) > 0:
-            numbers = dr.gather(index, bundles, places // RAYS) * RAYS + places % RAYS
+            numbers = _rays_of(bundles, places)
             answers = among(found, places, numbers)
             doubtful = _numbers_where(answers == DOUBTFUL)
             if len(doubtful) > 0:
@@ -144,11 +139,19 @@ def answers_to(
     found = settled(dr.arange(index, rays // RAYS), False)
     numbers = _numbers_where(found.unknown == 1)
     if len(numbers) > 0:
-        ray = dr.arange(index, len(numbers) * RAYS)
-        place = dr.gather(index, numbers, ray // RAYS) * RAYS + ray % RAYS
-        dr.scatter(found.answers, settled(numbers, True).answers, place)
+        dr.scatter(found.answers, settled(numbers, True).answers, _all_rays_of(numbers))
         dr.eval(found.answers)
     return found.answers
+
+
+def _rays_of(bundles: Any, places: Any) -> Any:
+    """The numbers (k,) of rays in these places among all of the bundles with these numbers (n,)."""
+    return dr.gather(type(bundles), bundles, places // RAYS) * RAYS + places % RAYS
+
+
+def _all_rays_of(bundles: Any) -> Any:
+    """The numbers (RAYS n,) of all rays of the bundles with these numbers (n,)."""
+    return _rays_of(bundles, dr.arange(type(bundles), len(bundles) * RAYS))
 
 
 def _numbers_where(mask: Any) -> Any:
