@@ -140,20 +140,27 @@ class Cones:
 
     def crossed(self, node: Node, least: Any) -> Any:
         """Mask: some ray may meet the box, at a reciprocal distance above `least`."""
+        entry, leave = self._span(node) if self.both else self._span_of_one_sign(node)
+        return (entry <= leave) & (entry * least <= BEHIND)
+
+    def _span(self, node: Node) -> tuple[Any, Any]:
+        """Between which distances (n,) some ray may be in the box."""
         entry, leave = self.start, type(self.start)(dr.inf)
         for k in range(3):
-            if not self.both:
-                # The steepest enters first, the flattest leaves last. Behind the point it is the other way
-                # round, but there both are less than 0.
-                entry = select_max(entry, dr.fma(node.first[k], self.rates[0][k], self.first[0][k]))
-                leave = select_min(leave, dr.fma(node.last[k], self.rates[1][k], self.last[1][k]))
-                continue
             near = [dr.fma(node.first[k], r[k], s[k]) for r, s in zip(self.rates, self.first, strict=True)]
             far = [dr.fma(node.last[k], r[k], s[k]) for r, s in zip(self.rates, self.last, strict=True)]
-            enters, leaves = select_min(*near), select_max(*far)
-            if self.both:
-                # Away from a box on either side nobody meets it; nobody leaves the slab for good.
-                enters = dr.select(self.mixed[k], select_max(near[1], far[0]), enters)
-                leaves = dr.select(self.mixed[k], dr.inf, leaves)
+            # Away from a box on either side nobody meets it; nobody leaves the slab for good.
+            enters = dr.select(self.mixed[k], select_max(near[1], far[0]), select_min(*near))
+            leaves = dr.select(self.mixed[k], dr.inf, select_max(*far))
             entry, leave = select_max(entry, enters), select_min(leave, leaves)
-        return (entry <= leave) & (entry * least <= BEHIND)
+        return entry, leave
+
+    def _span_of_one_sign(self, node: Node) -> tuple[Any, Any]:
+        """The same for bundles that are not mixed."""
+        entry, leave = self.start, type(self.start)(dr.inf)
+        for k in range(3):
+            # The steepest enters first, the flattest leaves last. Behind the point it is the other way round,
+            # but there both are less than 0.
+            entry = select_max(entry, dr.fma(node.first[k], self.rates[0][k], self.first[0][k]))
+            leave = select_min(leave, dr.fma(node.last[k], self.rates[1][k], self.last[1][k]))
+        return entry, leave
