@@ -18,10 +18,11 @@ from typing import Any
 
 from tracer.errors import UsageError
 from tracer.film.atomic import atomic_write
+from tracer.film.frame_work import WORK_NAME
 
 NAME = "frames.json"
 _VERSION = 2
-_OWN = re.compile(r"\d{4,}\.png|\d+\.work|\.tracer-[0-9a-f]{16}(\.json|\.png)")
+_OWN = re.compile(rf"\d{{4,}}\.png|{WORK_NAME.pattern}|\.tracer-[0-9a-f]{{16}}(\.json|\.png)")
 """Frames for movies, work files, and what a killed process left of them or of the record."""
 
 

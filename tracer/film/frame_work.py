@@ -16,7 +16,7 @@ from typing import Any
 
 from tracer.film.work_file import WorkFile
 
-NAME = re.compile(r"(\d{1,9})\.work")
+WORK_NAME = re.compile(r"(\d{1,9})\.work")
 
 
 class FrameWork:
@@ -34,7 +34,7 @@ class FrameWork:
         self._under_way: dict[int, WorkFile] = {}
         self._free: list[WorkFile] = []
         self._lock = Lock()
-        found = [(path, int(name[1])) for path in folder.iterdir() if (name := NAME.fullmatch(path.name))]
+        found = [(path, int(own[1])) for path in folder.iterdir() if (own := WORK_NAME.fullmatch(path.name))]
         self._last_number = max((number for _, number in found), default=0)
         for path, _ in found:
             identity = WorkFile(path).identity() or {}
