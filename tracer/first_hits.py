@@ -14,6 +14,7 @@ import numpy as np
 
 from tracer.acceleration.bundles import DOUBTFUL, RAYS, Found, answers_to
 from tracer.acceleration.first_of_bundles import HELD, Bundles, nearest_of_bundles
+from tracer.acceleration.nearby import Nearby
 from tracer.acceleration.traverse import visit_triangles
 from tracer.acceleration.triangle import TriangleTables
 from tracer.backends import INVALID
@@ -101,6 +102,7 @@ def nearest_among(scene: DeviceScene, ray: Ray, found: Found, places: Any) -> An
     known = dr.gather(type(places), found.answers, places)
     answered = known != DOUBTFUL
     nothing = no_hit(scene.backend, dr.width(places))
+    ray = Nearby.of(scene.backend, scene.triangles.lists, ray).ray
 
     def visit(state: Any, t: Any, primitive: Any, _test: Any, valid: Any) -> Any:
         hit, hoped = state
@@ -110,7 +112,7 @@ def nearest_among(scene: DeviceScene, ray: Ray, found: Found, places: Any) -> An
         scene.backend,
         scene.triangles,
         ray,
-        lambda: departure(scene, ray),
+        lambda: departure(scene, ray, True),
         state=(known_triangle(scene, ray, nothing, answered, known), nothing.t),
         limit=lambda state: state[0].t,
         visit=visit,

@@ -13,6 +13,7 @@ from typing import Any
 import drjit as dr
 
 from tracer.acceleration.departure import Departure, Ground
+from tracer.acceleration.nearby import Nearby
 from tracer.acceleration.traverse import distance_to, visit_triangles
 from tracer.acceleration.triangle import fetch_triangle, gather_triangle
 from tracer.backends import INVALID
@@ -111,16 +112,18 @@ def closest_triangle(scene: DeviceScene, ray: Ray, active: Any) -> Hit:
 def _closest_triangle(scene: DeviceScene, ray: Ray, hit: Hit, active: Any) -> Hit:
     """The nearest of a hit and all triangles."""
     assert scene.triangles is not None
-    return visit_triangles(
+    nearby = Nearby.of(scene.backend, scene.triangles.lists, ray)
+    found = visit_triangles(
         scene.backend,
         scene.triangles,
-        ray,
-        lambda: departure(scene, ray),
-        state=hit,
+        nearby.ray,
+        lambda: departure(scene, ray, ~nearby.moved),
+        state=nearby.seen(hit),
         limit=lambda hit: hit.t,
         visit=lambda hit, t, primitive, _test, valid: keep_nearer(hit, t, valid, primitive),
         active=active,
     )
+    return nearby.given(found, before=hit)
 
 
 def known_triangle(scene: DeviceScene, ray: Ray, hit: Hit, active: Any, slot: Any) -> Hit:
@@ -130,7 +133,9 @@ def known_triangle(scene: DeviceScene, ray: Ray, hit: Hit, active: Any, slot: An
 
     def meet(hit: Hit) -> Hit:
         triangle, primitive = fetch_triangle(backend, tables.rows, slot)
-        return keep_nearer(hit, distance_to(backend, tables.lists, ray, triangle), True, primitive)
+        nearby = Nearby.of(backend, tables.lists, ray)
+        t = distance_to(backend, tables.lists, nearby.ray, triangle)
+        return nearby.given(keep_nearer(nearby.seen(hit), t, True, primitive), before=hit)
 
     found: Hit = changed_where(active & (slot != INVALID), hit, meet, label="known triangle")
     return found
@@ -234,10 +239,10 @@ def barycentrics(v0: Any, v1: Any, v2: Any, p: Any) -> tuple[Any, Any]:
     return dr.dot(dr.cross(q, e2), cross) / area2, dr.dot(dr.cross(e1, q), cross) / area2
 
 
-def departure(scene: DeviceScene, ray: Ray) -> Departure:
-    """What rays know of the surface that they leave, looked up by its id."""
+def departure(scene: DeviceScene, ray: Ray, active: Any) -> Departure:
+    """What rays know of the surface that they leave, looked up by its id; nothing outside of the mask."""
     backend = scene.backend
-    active = ray.departing
+    active = ray.departing & active
     kind, row = _left(scene, ray, active)
     assert scene.triangles is not None
     is_mesh = active & (kind == MESH)
@@ -252,9 +257,9 @@ def departure(scene: DeviceScene, ray: Ray) -> Departure:
     return _departure(scene, ray, active, dr.select(below, -outward, outward))
 
 
-def departure_to_light(scene: DeviceScene, ray: Ray, surface: Surface) -> Departure:
+def departure_to_light(scene: DeviceScene, ray: Ray, surface: Surface, active: Any) -> Departure:
     """The same for a ray that leaves a known surface on its lit side."""
-    return _departure(scene, ray, dr.full(scene.backend.Bool, True, dr.width(ray.d)), surface.lit_side)
+    return _departure(scene, ray, active, surface.lit_side)
 
 
 def _departure(scene: DeviceScene, ray: Ray, active: Any, normal: Any) -> Departure:

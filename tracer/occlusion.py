@@ -7,6 +7,7 @@ from typing import Any
 
 import drjit as dr
 
+from tracer.acceleration.nearby import toward_point
 from tracer.acceleration.traverse import Fold, visit_triangles
 from tracer.bits import masks_in_word
 from tracer.branches import changed_where
@@ -86,16 +87,17 @@ def hidden_by_triangle(
     """Mask: `blocked` already, or a triangle, of all or `among` some (see `visit_triangles`), lies strictly
     between the two ends."""
     assert scene.triangles is not None
+    ray, light, turned = toward_point(scene.triangles.lists, segment)
     return visit_triangles(
         scene.backend,
         scene.triangles,
-        segment.ray,
-        lambda: departure_to_light(scene, segment.ray, surface),
+        ray,
+        lambda: departure_to_light(scene, segment.ray, surface, ~turned),
         state=blocked,
         limit=lambda blocked: segment.length,
         visit=lambda blocked, _t, _primitive, _test, valid: blocked | valid,
         active=active,
-        light=segment.length,
+        light=light,
         done=lambda blocked: blocked,
         among=among,
     )
@@ -123,18 +125,19 @@ def transmittance(
             segment, share, active & suspects.many, step=passed, done=lambda share: share == 0
         )
     if scene.triangles is not None:
+        ray, light, turned = toward_point(scene.triangles.lists, segment)
         share = visit_triangles(
             backend,
             scene.triangles,
-            segment.ray,
-            lambda: departure_to_light(scene, segment.ray, surface),
+            ray,
+            lambda: departure_to_light(scene, segment.ray, surface, ~turned),
             state=share,
             limit=lambda share: segment.length,
             visit=lambda share, _t, primitive, test, valid: dr.select(
                 valid, share * _crossed(_refraction_of(scene, primitive), test.owned), share
             ),
             active=active & suspects.meshes & (share > 0),
-            light=segment.length,
+            light=light,
             done=lambda share: share == 0,
         )
     return share

@@ -192,7 +192,7 @@ def any_triangle(device: Any, ray: Ray, length: Any, active: Any, among: Fold | 
         device.backend,
         device.triangles,
         ray,
-        lambda: departure(device, ray),
+        lambda: departure(device, ray, True),
         state=dr.full(device.backend.Bool, False, dr.width(ray.d)),
         limit=lambda blocked: length,
         visit=lambda blocked, _t, _primitive, _test, valid: blocked | valid,
