@@ -138,12 +138,14 @@ def _dark_samples(
     suspects, todo = [], dr.zeros(backend.UInt32, width)
     known = [] if shadows is None else list(shadows.hidden)
     for light, faces, is_area in zip(lights, facing, areas, strict=True):
-        who = find_suspects(scene, surface, light.ball, faces, spheres=is_area, beams=is_area)
+        who = find_suspects(scene, surface, light.ball, faces, spheres=any(areas), beams=is_area)
         if shadows is not None and known and not is_area:
             who.meshes &= ~shadows.known
             who.umbra |= shadows.known & known.pop(0)
         bits = ((1 << len(light.samples)) - 1) << light.first
-        todo |= dr.select(faces & who.doubtful, backend.UInt32(bits), 0)
+        # Of spheres by themselves only area lights are asked here.
+        asked = who.doubtful & (is_area | who.meshes | who.many)
+        todo |= dr.select(faces & asked, backend.UInt32(bits), 0)
         dark |= dr.select(who.umbra, backend.UInt32(bits), 0)
         suspects.append(who)
 
@@ -154,9 +156,9 @@ def _dark_samples(
         who = suspects[0]
         for light, other in zip(lights[1:], suspects[1:], strict=True):
             who = dr.select(number >= light.first, other, who)
-        blocked = dr.full(backend.Bool, False, width)
-        if any(areas):
-            blocked = hidden_by_sphere(scene, segment, ~blocked, who)
+        # The cheap ones first: a light is often hidden by the sphere that its point lies in.
+        everybody = dr.full(backend.Bool, True, width)
+        blocked = hidden_by_sphere(scene, segment, everybody, who if any(areas) else None)
         blocked = blocked | hidden_by_many(scene, segment, surface, who, ~blocked)
         return todo & (todo - 1), dark | dr.select(blocked, backend.UInt32(1) << number, 0)
 
