@@ -158,7 +158,7 @@ def _dark_samples(
             who = dr.select(number >= light.first, other, who)
         # The cheap ones first: a light is often hidden by the sphere that its point lies in.
         everybody = dr.full(backend.Bool, True, width)
-        blocked = hidden_by_sphere(scene, segment, everybody, who if any(areas) else None)
+        blocked = hidden_by_sphere(scene, segment, everybody, who.spheres)
         blocked = blocked | hidden_by_many(scene, segment, surface, who, ~blocked)
         return todo & (todo - 1), dark | dr.select(blocked, backend.UInt32(1) << number, 0)
 
@@ -181,6 +181,7 @@ def _looped(
 ) -> DirectLight:
     backend, lights = scene.backend, scene.lights
     width = dr.width(active)
+    spheres = lights.areas or scene.options.transparent_shadows
 
     def body(
         i: Any, light: Any, who: Suspects, shift: Any, received: DirectLight, seen: list[Any]
@@ -191,7 +192,7 @@ def _looped(
             if lights.jitter:
                 shift = jitter_shift(backend, lights, number, pixel, sub_ray)
             ball = fetch_ball(backend, lights, number)
-            return find_suspects(scene, surface, ball, active, spheres=True, beams=lights.areas), shift
+            return find_suspects(scene, surface, ball, active, spheres=spheres, beams=lights.areas), shift
 
         who, shift = dr.if_stmt(
             args=(who, shift),
@@ -218,7 +219,7 @@ def _looped(
     start = (
         dr.select(active, dr.zeros(backend.UInt32, width), lights.count),
         dr.full(backend.UInt32, INVALID, width),
-        Suspects.nobody(backend, width),
+        Suspects.nobody(backend, width, spheres),
         dr.zeros(backend.Vector2, width),
         DirectLight.none(backend, width, watch),
         watch.seen,

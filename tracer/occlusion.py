@@ -22,7 +22,7 @@ def hidden(scene: DeviceScene, segment: Segment, surface: Surface, suspects: Sus
     """Mask: some shape lies strictly between the surface and the light; of spheres and meshes only suspects
     are asked."""
     blocked = hidden_by_plane(scene, segment, active) | (suspects.umbra & active)
-    blocked = blocked | hidden_by_sphere(scene, segment, active & ~blocked, suspects)
+    blocked = blocked | hidden_by_sphere(scene, segment, active & ~blocked, suspects.spheres)
     return blocked | hidden_by_many(scene, segment, surface, suspects, active & ~blocked)
 
 
@@ -36,10 +36,9 @@ def hidden_by_plane(scene: DeviceScene, segment: Segment, active: Any) -> Any:
     return blocked & active
 
 
-def hidden_by_sphere(
-    scene: DeviceScene, segment: Segment, active: Any, suspects: Suspects | None = None
-) -> Any:
-    """Mask: a sphere that stands in the kernel (and is suspect) lies strictly between the two ends."""
+def hidden_by_sphere(scene: DeviceScene, segment: Segment, active: Any, suspects: Any = None) -> Any:
+    """Mask: a sphere that stands in the kernel lies strictly between the two ends; `suspects` (n,): the bits
+    of those that may (see `Suspects`), None where nobody has looked."""
     backend, rows = scene.backend, scene.sphere_rows
     nothing = dr.full(backend.Bool, False, dr.width(segment.length))
     if rows is None:
@@ -47,7 +46,7 @@ def hidden_by_sphere(
     if suspects is None:
         word = masks_in_word(backend, [slot.may_block(segment, backend.epsilon) for slot in scene.spheres])
     else:
-        word = suspects.spheres & ((1 << len(scene.spheres)) - 1)  # everybody may be more than there are
+        word = suspects & ((1 << len(scene.spheres)) - 1)  # everybody may be more than there are
 
     def body(todo: Any, blocked: Any) -> tuple[Any, Any]:
         blocked = rows.fetch(dr.tzcnt(todo)).blocks(segment, True)

@@ -135,7 +135,7 @@ def _power(backend: Backend, size: Any, radius: Any) -> Any:
 @dataclass
 class Suspects:
     """Who may hide a light from n points: `spheres` (n,) one bit for each sphere that stands in the kernel,
-    in their order; masks `many` and `meshes` (n,): one of many spheres in a table, a mesh; `umbra` (n,)
+    in their order, None where they were not looked at; masks `many` and `meshes` (n,): one of many spheres in a table, a mesh; `umbra` (n,)
     mask: something opaque certainly hides all samples of the light."""
 
     spheres: Any
@@ -144,11 +144,11 @@ class Suspects:
     umbra: Any
 
     @staticmethod
-    def nobody(backend: Backend, width: int) -> Suspects:
-        """No suspects, in full width."""
+    def nobody(backend: Backend, width: int, spheres: bool) -> Suspects:
+        """No suspects, in full width; `spheres`: whether these are looked at."""
         # Each with memory of its own: `|=` changes arrays in place.
         many, meshes, umbra = (dr.zeros(backend.Bool, width) for _ in range(3))
-        return Suspects(dr.zeros(backend.UInt32, width), many, meshes, umbra)
+        return Suspects(dr.zeros(backend.UInt32, width) if spheres else None, many, meshes, umbra)
 
     @staticmethod
     def everybody(backend: Backend, width: int) -> Suspects:
@@ -160,4 +160,5 @@ class Suspects:
     @property
     def doubtful(self) -> Any:
         """Mask: samples must be asked one by one."""
-        return ((self.spheres != 0) | self.many | self.meshes) & ~self.umbra
+        listed = self.many | self.meshes
+        return (listed if self.spheres is None else listed | (self.spheres != 0)) & ~self.umbra

@@ -19,11 +19,11 @@ def find_suspects(
 ) -> Suspects:
     """Who may hide a light, whose samples the ball holds, from the points of a surface.
 
-    Without `spheres` only the others are looked at; without `beams` every mesh near the way is suspect. To
-    look along a beam pays where it stands for several shadow rays.
+    Without `spheres` only the others are looked at; without `beams` every mesh near the way is suspect. Both
+    pay where they stand for several shadow rays.
     """
     backend = scene.backend
-    who = Suspects.nobody(backend, dr.width(surface.p))
+    who = Suspects.nobody(backend, dr.width(surface.p), spheres)
     shaft = Shaft.of(backend, surface.p, ball)
     for number, slot in enumerate(scene.spheres if spheres else []):
         suspect, umbra = _meet_sphere(shaft, surface, slot)
