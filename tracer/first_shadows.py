@@ -18,7 +18,7 @@ from tracer.acceleration.traverse import Fold
 from tracer.arrival import segment_to
 from tracer.canvas import DeviceCanvas
 from tracer.device_scene import DeviceScene
-from tracer.direct_light import may_be_lit
+from tracer.few_lights import may_be_lit
 from tracer.intersection import Known, Surface, closest_hit, free_ray, surface_at
 from tracer.light_tables import LightSample, UnrolledLight
 from tracer.occlusion import hidden_by_plane, hidden_by_triangle

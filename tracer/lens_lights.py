@@ -11,9 +11,9 @@ import numpy as np
 from tracer.arrival import Finish, arrive
 from tracer.backends import INVALID
 from tracer.device_scene import DeviceScene
-from tracer.direct_light import plane_bits_of
 from tracer.intersection import Surface, closest_hit
 from tracer.light_tables import fetch_ball, fetch_sample, jitter_shift
+from tracer.many_lights import plane_bits_of
 from tracer.occlusion import hidden, transmittance
 from tracer.ray_tree import LightTerm, Triple
 from tracer.replay import put_together, take_apart

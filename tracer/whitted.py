@@ -20,7 +20,8 @@ from tracer.arrival import DirectLight
 from tracer.backends import INVALID, Backend
 from tracer.canvas import DeviceCanvas
 from tracer.device_scene import DeviceScene
-from tracer.direct_light import Shadows, direct_light
+from tracer.direct_light import direct_light
+from tracer.few_lights import Shadows
 from tracer.first_hits import FirstHits
 from tracer.intersection import Known, Surface, closest_hit, free_ray, surface_at
 from tracer.path import make_path, path_type

@@ -12,7 +12,7 @@ import pytest
 
 import tracer
 from tests.accuracy import worlds
-from tracer import direct_light
+from tracer import few_lights, many_lights
 from tracer.device_scene import DeviceScene
 from tracer.intersection import Surface
 from tracer.shafts import Suspects
@@ -27,7 +27,8 @@ def check_picture(table: dict[str, Any], folder: Any, precision: str, patch: pyt
     scene = tracer.load(table, base_dir=folder)
     spared = tracer.render(scene, precision=precision)
     with patch.context() as plain:
-        plain.setattr(direct_light, "find_suspects", everybody)
+        for lights in (few_lights, many_lights):
+            plain.setattr(lights, "find_suspects", everybody)
         asked = tracer.render(scene, precision=precision)
     assert spared.color.tobytes() == asked.color.tobytes()
 
