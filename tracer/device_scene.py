@@ -16,32 +16,30 @@ import numpy as np
 from tracer.acceleration.triangle import TriangleTables
 from tracer.backends import INVALID, Backend
 from tracer.color import decode_srgb
-from tracer.device_meshes import SmoothTables, compile_meshes, inherited, placed_meshes
+from tracer.device_meshes import SmoothTables, compile_meshes, placed_meshes
+from tracer.device_shapes import (
+    analytic_shapes,
+    extent_of,
+    geometry_rows,
+    id_rows,
+    kind_of,
+    object_space,
+    surface_rows,
+)
 from tracer.device_textures import compile_textures
 from tracer.errors import SceneError
 from tracer.last_scenes import LastScenes
 from tracer.light_tables import LightTables, compile_lights
-from tracer.material import Material
-from tracer.ray import SIDE_BITS
 from tracer.replay import NOT_IN_KERNELS
 from tracer.scene import Scene
 from tracer.shafts import Enclosure
-from tracer.shapes import Plane, ShapeRecord, Sphere
 from tracer.shapes.sphere import SphereSlot
 from tracer.shapes.sphere_table import SphereRows, SphereTable
 from tracer.shapes.triangles import PlacedMesh
-from tracer.textures.tables import PackedTexture, TextureTables
-
-PLANE, SPHERE, MESH = range(3)
-
-KIND_UNIT = 256
-"""The kind of a shape stands above the texture flags in one word."""
+from tracer.textures.tables import TextureTables
 
 DOCUMENT_STACK = 20
 """Pending rays of a pixel at the document's cut-off, 0.05."""
-
-UNROLLED_SPHERES = 32
-"""Up to so many spheres stand in the kernel one by one; over more there is a hierarchy."""
 
 
 @dataclass(frozen=True)
@@ -76,8 +74,8 @@ class DeviceScene:
     `triangles`: those of all meshes; `enclosures`: balls around the meshes. Tables by shape, in packets of
     four: `geometry` (plane n, d or sphere center, radius), `ids` (shape kind times 256 plus texture flags,
     first color, count of colors, plane bit), `surfaces` (ior, k_r, k_t, k_a; m, h, s, texture rate),
-    `object_space` (the 3x4 matrix back), `first_primitive` (one
-    each). By primitive, when there are meshes: `shape_of`, and `slot_of` its triangle in the hierarchy.
+    `object_space` (the 3x4 matrix back), `first_primitive` (one each). By primitive, when there are meshes:
+    `shape_of`, and `slot_of` its triangle in the hierarchy.
     """
 
     backend: Backend
@@ -132,10 +130,10 @@ def _compiled(scene: Scene, backend: Backend) -> DeviceScene:
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     if first[-1] >= INVALID >> 1:
         raise SceneError(f"{scene.name}: {first[-1]} primitives; allowed: fewer than 2^31")
-    rows = _geometry_rows(scene)
-    host = HostScene(first, meshes, _extent(scene, rows, meshes))
+    rows = geometry_rows(scene)
+    host = HostScene(first, meshes, extent_of(scene, rows, meshes))
     decode = decode_srgb if scene.color_space == "linear" else np.asarray
-    slots, sphere_rows, sphere_table, planes = _analytic_shapes(scene, backend, rows, first)
+    slots, sphere_rows, sphere_table, planes = analytic_shapes(scene, backend, rows, first)
     tables = compile_meshes(scene, backend, meshes, first)
     textures = compile_textures(scene, backend)
     return DeviceScene(
@@ -146,7 +144,7 @@ def _compiled(scene: Scene, backend: Backend) -> DeviceScene:
             transparent_shadows=scene.transparent_shadows,
             diffuse_is_lambert=scene.diffuse_term == "lambert",
         ),
-        kinds=frozenset(_kind(shape) for shape in scene.shapes),
+        kinds=frozenset(kind_of(shape) for shape in scene.shapes),
         slots=slots,
         sphere_rows=sphere_rows,
         sphere_table=sphere_table,
@@ -156,10 +154,10 @@ def _compiled(scene: Scene, backend: Backend) -> DeviceScene:
         shape_of=tables.shape_of,
         slot_of=tables.slot_of,
         geometry=backend.table(rows),
-        ids=backend.id_table(_id_rows(scene, textures.by_shape)),
+        ids=backend.id_table(id_rows(scene, textures.by_shape)),
         first_primitive=backend.id_table(first[:-1] if len(first) > 1 else [0]),
-        surfaces=backend.table(_surface_rows(scene, textures.by_shape)),
-        object_space=_object_space(scene, backend),
+        surfaces=backend.table(surface_rows(scene, textures.by_shape)),
+        object_space=object_space(scene, backend),
         textures=textures.tables,
         lights=compile_lights(
             backend,
@@ -189,75 +187,3 @@ def stack_entries(cutoff: float, max_depth: int) -> int:
     level. Few sizes, since each is a kernel of its own: that of the document's cut-off, or a power of two."""
     needed = min(int(1 / weight_floor(cutoff)), max_depth)
     return DOCUMENT_STACK if needed <= DOCUMENT_STACK else 1 << (needed - 1).bit_length()
-
-
-def _kind(shape: ShapeRecord) -> int:
-    return PLANE if isinstance(shape, Plane) else SPHERE if isinstance(shape, Sphere) else MESH
-
-
-def _analytic_shapes(
-    scene: Scene, backend: Backend, rows: np.ndarray, first: np.ndarray
-) -> tuple[list[Any], SphereRows | None, SphereTable | None, np.ndarray]:
-    """Planes and spheres for the kernel, and the rows (n, d) of the planes that have bits."""
-    spheres = [i for i, shape in enumerate(scene.shapes) if isinstance(shape, Sphere)]
-    many = len(spheres) > UNROLLED_SPHERES
-    planes: list[int] = []
-    slots: list[Any] = []
-    for i, shape in enumerate(scene.shapes):
-        if isinstance(shape, Plane) or (isinstance(shape, Sphere) and not many):
-            slots.append(shape.slot(backend, rows[i], int(first[i]), len(planes)))
-        if isinstance(shape, Plane):
-            planes.append(i)
-    table = SphereTable.of(backend, rows[spheres], first[spheres]) if many else None
-    few = SphereRows.of(backend, rows[spheres], first[spheres]) if spheres and not many else None
-    return slots, few, table, rows[planes[:SIDE_BITS]]
-
-
-def _geometry_rows(scene: Scene) -> np.ndarray:
-    """(shapes, 4): n, d of a plane, center and radius of a sphere, zero for meshes; at least one row."""
-    rows = np.zeros((max(1, len(scene.shapes)), 4))
-    for i, shape in enumerate(scene.shapes):
-        if isinstance(shape, (Plane, Sphere)):
-            rows[i] = shape.placed_coefficients()
-    return rows
-
-
-def _id_rows(scene: Scene, textures: list[PackedTexture]) -> np.ndarray:
-    rows = np.zeros((max(1, len(scene.shapes)), 4), np.int64)
-    planes = 0
-    for i, (shape, texture) in enumerate(zip(scene.shapes, textures, strict=True)):
-        bit = 0
-        if isinstance(shape, Plane):
-            bit = 1 << planes if planes < SIDE_BITS else 0
-            planes += 1
-        rows[i] = _kind(shape) * KIND_UNIT + texture.flags, texture.first, texture.count, bit
-    return rows
-
-
-def _surface_rows(scene: Scene, textures: list[PackedTexture]) -> np.ndarray:
-    rows = np.zeros((max(1, len(scene.shapes)), 8))
-    for i, (shape, texture) in enumerate(zip(scene.shapes, textures, strict=True)):
-        name = inherited(scene, shape, "material")
-        m = Material() if name is None else scene.materials[name]
-        rows[i, :4] = m.ior, m.reflection, m.refraction, m.absorption
-        rows[i, 4:] = m.diffuse, m.specular, m.shininess, texture.rate
-    return rows
-
-
-def _object_space(scene: Scene, backend: Backend) -> Any:
-    """The 3x4 matrices back to object space, or None when no shape asks for them."""
-    wanted = [inherited(scene, shape, "texture_space") == "object" for shape in scene.shapes]
-    if not any(wanted):
-        return None
-    rows = np.tile(np.eye(3, 4), (len(wanted), 1, 1))
-    for i, shape in enumerate(scene.shapes):
-        if wanted[i]:
-            rows[i] = shape.placement.inverse()
-    return backend.table(rows)
-
-
-def _extent(scene: Scene, rows: np.ndarray, meshes: dict[int, PlacedMesh]) -> float:
-    """S: the largest |coordinate| of the finite shapes (spheres and meshes), 0 without any."""
-    largest = [float(np.abs(mesh.corners).max()) for mesh in meshes.values()]
-    spheres = rows[[i for i, shape in enumerate(scene.shapes) if isinstance(shape, Sphere)]]
-    return max([*largest, *(np.abs(spheres[:, :3]).max(axis=1) + spheres[:, 3])], default=0.0)

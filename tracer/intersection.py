@@ -18,7 +18,8 @@ from tracer.acceleration.traverse import distance_to, visit_triangles
 from tracer.acceleration.triangle import fetch_triangle, gather_triangle
 from tracer.backends import INVALID
 from tracer.branches import changed_where
-from tracer.device_scene import KIND_UNIT, MESH, PLANE, SPHERE, DeviceScene
+from tracer.device_scene import DeviceScene
+from tracer.device_shapes import KIND_UNIT, MESH, PLANE, SPHERE
 from tracer.ray import (
     Hit,
     Ray,

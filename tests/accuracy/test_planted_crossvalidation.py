@@ -18,7 +18,7 @@ from reference.comparison import Outcome, cameras, find_terms, run
 from reference.mitsuba_scene import MitsubaScene
 from reference.random_scenes import random_scene
 from tracer import canvas as canvas_module
-from tracer import device_scene, intersection, light_tables, queries
+from tracer import device_scene, device_shapes, intersection, light_tables, queries
 from tracer.canvas import DeviceCanvas
 from tracer.material import Material
 from tracer.ray import Hit, Ray, keep_nearer
@@ -36,7 +36,7 @@ def normal_flipped(patch: pytest.MonkeyPatch) -> None:
     true = SphereSlot.surface
     patch.setitem(
         intersection.ANALYTIC_SURFACES,
-        device_scene.SPHERE,
+        device_shapes.SPHERE,
         lambda row, p: (true(row, p)[0], -true(row, p)[1]),
     )
 

@@ -21,7 +21,7 @@ from tests.unit.node_lists import (
     leaf_one_short,
     planes_swapped,
 )
-from tracer import device_scene
+from tracer import device_shapes
 from tracer.acceleration import layout
 from tracer.backends import INVALID, Backend, exact_arithmetic, find_backend
 from tracer.ray import Ray, Segment, no_hit, normalize
@@ -342,7 +342,7 @@ def test_a_picture_is_that_of_spheres_one_by_one(transparent: bool, monkeypatch:
     table = worlds.FEATURES["many spheres"]() | {"transparent_shadows": transparent}
     table["shapes"] = [shape for shape in table["shapes"] if shape["kind"] == "sphere"][:32]
     few = tracer.render(tracer.load(table), aovs="all")
-    monkeypatch.setattr(device_scene, "UNROLLED_SPHERES", 0)
+    monkeypatch.setattr(device_shapes, "UNROLLED_SPHERES", 0)
     many = tracer.render(tracer.load(table), aovs="all")
     assert many.stats["rays"] == few.stats["rays"]
     for name in many.aovs:
