@@ -11,11 +11,12 @@ import drjit as dr
 from tracer.canvas import DeviceCanvas
 from tracer.device_scene import DeviceScene
 from tracer.film.layout import VISIBILITY
-from tracer.intersection import Surface, free_ray, surface_at
+from tracer.intersection import free_ray
 from tracer.pixels import PixelGrid, primary_ray
 from tracer.ray import Hit
 from tracer.spawn import material_at
 from tracer.sums import PARTS
+from tracer.surface import Surface, surface_at
 from tracer.textures.tables import PICTURE, picture_coordinates
 from tracer.whitted import Counts, PixelColumns, texture_point
 

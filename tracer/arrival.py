@@ -9,9 +9,10 @@ import drjit as dr
 
 from tracer.backends import Backend
 from tracer.device_scene import DeviceScene
-from tracer.intersection import Surface, leave
+from tracer.leaving import leave
 from tracer.light_tables import LightSample
 from tracer.ray import Ray, Segment
+from tracer.surface import Surface
 
 VANISHING = -1000
 """Highlights of 2^-1000 and less are none."""

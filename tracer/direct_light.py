@@ -7,9 +7,9 @@ from typing import Any
 from tracer.arrival import NOTHING_WATCHED, DirectLight, Finish, Watch
 from tracer.device_scene import DeviceScene
 from tracer.few_lights import Shadows, light_of_few
-from tracer.intersection import Surface
 from tracer.many_lights import light_of_many
 from tracer.ray import Ray
+from tracer.surface import Surface
 
 
 def direct_light(

@@ -11,11 +11,11 @@ import drjit as dr
 from tracer.arrival import DirectLight, Finish, Watch, arrive, segment_to
 from tracer.backends import Backend
 from tracer.device_scene import DeviceScene
-from tracer.intersection import Surface
 from tracer.light_tables import LightSample, UnrolledLight, fetch_position
 from tracer.occlusion import hidden_by_many, hidden_by_plane, hidden_by_sphere
 from tracer.ray import Ray, max_abs
 from tracer.shafts import Ball
+from tracer.surface import Surface
 from tracer.suspects import find_suspects
 
 

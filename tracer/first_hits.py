@@ -21,10 +21,12 @@ from tracer.backends import INVALID
 from tracer.canvas import Canvas, DeviceCanvas
 from tracer.device_scene import DeviceScene
 from tracer.first_shadows import first_shadows
-from tracer.intersection import closest_triangle, departure, free_ray, known_triangle, slot_of
+from tracer.intersection import closest_triangle, free_ray, known_triangle
+from tracer.leaving import departure
 from tracer.pixels import Lanes, numbered_rays
 from tracer.ray import Hit, Ray, keep_nearer, no_hit, select_min
 from tracer.replay import Program
+from tracer.surface import slot_of
 
 FEWEST_RAYS = 1 << 18
 """For fewer it takes longer to record the bundles than they save."""

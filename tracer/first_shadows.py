@@ -19,12 +19,13 @@ from tracer.arrival import segment_to
 from tracer.canvas import DeviceCanvas
 from tracer.device_scene import DeviceScene
 from tracer.few_lights import may_be_lit
-from tracer.intersection import Known, Surface, closest_hit, free_ray, surface_at
+from tracer.intersection import Known, closest_hit, free_ray
 from tracer.light_tables import LightSample, UnrolledLight
 from tracer.occlusion import hidden_by_plane, hidden_by_triangle
 from tracer.pixels import Lanes, numbered_rays
 from tracer.ray import Ray
 from tracer.replay import Program
+from tracer.surface import Surface, surface_at
 from tracer.suspects import find_suspects
 
 MOST_LIGHTS = 4

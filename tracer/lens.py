@@ -14,13 +14,14 @@ from tracer.color import decode_srgb
 from tracer.device_meshes import inherited
 from tracer.device_scene import DeviceScene, compile_scene, weight_floor
 from tracer.errors import UsageError
-from tracer.intersection import Surface, closest_hit, surface_at
+from tracer.intersection import closest_hit
 from tracer.lens_lights import LightsUnderTheLens, name_of, picked, triple
 from tracer.pixels import PixelGrid
 from tracer.ray_tree import EndedRay, HitPoint, LightTerm, PixelTree, RayNode
 from tracer.scene import Scene
 from tracer.settings import Settings, picture_canvas, with_seed
 from tracer.spawn import MaterialRow, material_at, spawn
+from tracer.surface import Surface, surface_at
 from tracer.textures.tables import texture_color
 from tracer.whitted import primary_path, texture_point
 

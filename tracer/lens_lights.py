@@ -11,7 +11,7 @@ import numpy as np
 from tracer.arrival import Finish, arrive
 from tracer.backends import INVALID
 from tracer.device_scene import DeviceScene
-from tracer.intersection import Surface, closest_hit
+from tracer.intersection import closest_hit
 from tracer.light_tables import fetch_ball, fetch_sample, jitter_shift
 from tracer.many_lights import plane_bits_of
 from tracer.occlusion import hidden, transmittance
@@ -19,6 +19,7 @@ from tracer.ray_tree import LightTerm, Triple
 from tracer.replay import put_together, take_apart
 from tracer.scene import Scene
 from tracer.spawn import MaterialRow
+from tracer.surface import Surface
 from tracer.suspects import find_suspects
 
 

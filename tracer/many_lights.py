@@ -12,12 +12,12 @@ import drjit as dr
 from tracer.arrival import DirectLight, Finish, Watch, arrive
 from tracer.backends import INVALID
 from tracer.device_scene import DeviceScene
-from tracer.intersection import Surface
 from tracer.light_tables import fetch_ball, fetch_sample, jitter_shift
 from tracer.occlusion import hidden, transmittance
 from tracer.ray import Ray, max_abs
 from tracer.shafts import Suspects
 from tracer.shapes.plane import PlaneSlot
+from tracer.surface import Surface
 from tracer.suspects import find_suspects
 
 

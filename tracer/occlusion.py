@@ -12,10 +12,11 @@ from tracer.acceleration.traverse import Fold, visit_triangles
 from tracer.bits import masks_in_word
 from tracer.branches import changed_where
 from tracer.device_scene import DeviceScene
-from tracer.intersection import Surface, departure_to_light, shape_of
+from tracer.leaving import departure_to_light
 from tracer.ray import Segment
 from tracer.shafts import Suspects
 from tracer.shapes.plane import PlaneSlot
+from tracer.surface import Surface, shape_of
 
 
 def hidden(scene: DeviceScene, segment: Segment, surface: Surface, suspects: Suspects, active: Any) -> Any:

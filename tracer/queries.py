@@ -17,10 +17,12 @@ from numpy.typing import ArrayLike
 from tracer.backends import INVALID, Backend, exact_arithmetic, find_backend
 from tracer.device_scene import DeviceScene, compile_scene
 from tracer.errors import UsageError
-from tracer.intersection import closest_hit, free_ray, leave, surface_at
+from tracer.intersection import closest_hit, free_ray
+from tracer.leaving import leave
 from tracer.ray import Hit, Ray, normalize
 from tracer.scene import Scene
 from tracer.spawn import material_at, refract_direction
+from tracer.surface import surface_at
 
 UNIT_SLACK = 6
 """How far from 1 the square of a unit vector's length may be, in eps: its components round (2), and so does

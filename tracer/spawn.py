@@ -10,9 +10,10 @@ import drjit as dr
 from tracer.arrival import Finish
 from tracer.branches import changed_where
 from tracer.device_scene import DeviceScene
-from tracer.intersection import Surface, leave
+from tracer.leaving import leave
 from tracer.path import make_path
 from tracer.ray import Ray, unit_again
+from tracer.surface import Surface
 from tracer.textures.tables import TextureRow
 
 

@@ -8,10 +8,10 @@ import drjit as dr
 
 from tracer.acceleration.beam import CLEAR, COVERED, DOUBTFUL, first_verdict, look_along
 from tracer.device_scene import DeviceScene
-from tracer.intersection import Surface
 from tracer.shafts import Ball, Shaft, Suspects
 from tracer.shapes.sphere import SphereSlot
 from tracer.shapes.sphere_table import SphereTable
+from tracer.surface import Surface
 
 
 def find_suspects(

@@ -23,11 +23,12 @@ from tracer.device_scene import DeviceScene
 from tracer.direct_light import direct_light
 from tracer.few_lights import Shadows
 from tracer.first_hits import FirstHits
-from tracer.intersection import Known, Surface, closest_hit, free_ray, surface_at
+from tracer.intersection import Known, closest_hit, free_ray
 from tracer.path import make_path, path_type
 from tracer.pixels import PixelGrid, primary_ray
 from tracer.spawn import material_at, spawn
 from tracer.sums import Sums
+from tracer.surface import Surface, surface_at
 from tracer.textures.tables import texture_color
 
 

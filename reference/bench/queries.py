@@ -186,7 +186,7 @@ def hidden_neighbors(device: Any, o: Any, light: Any) -> Any:
 def any_triangle(device: Any, ray: Ray, length: Any, active: Any, among: Fold | None = None) -> Any:
     """Mask: some triangle, of all or `among` some (see `visit_triangles`), is hit before `length`; the walk
     ends with the first."""
-    from tracer.intersection import departure
+    from tracer.leaving import departure
 
     return visit_triangles(
         device.backend,

@@ -27,8 +27,9 @@ from tracer.arrival import Finish
 from tracer.backends import exact_arithmetic, find_backend
 from tracer.device_scene import compile_scene
 from tracer.direct_light import direct_light
-from tracer.intersection import closest_hit, free_ray, surface_at
+from tracer.intersection import closest_hit, free_ray
 from tracer.queries import END_GUARD
+from tracer.surface import surface_at
 
 Array = np.ndarray
 

@@ -18,13 +18,14 @@ from tracer.acceleration.triangle import Triangle, meet_triangle, projection_axe
 from tracer.arrival import segment_to
 from tracer.backends import exact_arithmetic, find_backend
 from tracer.device_scene import DeviceScene
-from tracer.intersection import Surface, closest_hit, free_ray, surface_at
+from tracer.intersection import closest_hit, free_ray
 from tracer.light_tables import LightSample
 from tracer.occlusion import hidden_by_many
 from tracer.ray import Ray, normalize
 from tracer.shafts import CONTACT_REACH, Ball, Shaft, Suspects
 from tracer.shapes import Mesh
 from tracer.shapes.triangles import MeshData, place_mesh
+from tracer.surface import Surface, surface_at
 from tracer.suspects import find_suspects
 
 Array = np.ndarray

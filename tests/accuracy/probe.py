@@ -11,10 +11,12 @@ import numpy as np
 import tracer
 from tracer.backends import INVALID, exact_arithmetic, find_backend
 from tracer.device_scene import DeviceScene, compile_scene
-from tracer.intersection import closest_hit, free_ray, leave, surface_at
+from tracer.intersection import closest_hit, free_ray
+from tracer.leaving import leave
 from tracer.occlusion import hidden
 from tracer.ray import Segment, max_abs, normalize
 from tracer.shafts import Ball, Suspects
+from tracer.surface import surface_at
 from tracer.suspects import find_suspects
 
 Array = np.ndarray

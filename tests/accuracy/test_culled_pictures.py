@@ -14,8 +14,8 @@ import tracer
 from tests.accuracy import worlds
 from tracer import few_lights, many_lights
 from tracer.device_scene import DeviceScene
-from tracer.intersection import Surface
 from tracer.shafts import Suspects
+from tracer.surface import Surface
 
 
 def everybody(scene: DeviceScene, surface: Surface, *_: Any, **__: Any) -> Suspects:

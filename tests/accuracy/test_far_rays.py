@@ -18,9 +18,11 @@ from tracer.acceleration.traverse import visit_triangles
 from tracer.arrival import segment_to
 from tracer.backends import exact_arithmetic, find_backend
 from tracer.device_scene import compile_scene
-from tracer.intersection import closest_hit, departure, free_ray, surface_at
+from tracer.intersection import closest_hit, free_ray
+from tracer.leaving import departure
 from tracer.light_tables import LightSample
 from tracer.occlusion import hidden_by_triangle
+from tracer.surface import surface_at
 
 Array = np.ndarray
 

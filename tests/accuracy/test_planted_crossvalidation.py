@@ -18,7 +18,7 @@ from reference.comparison import Outcome, cameras, find_terms, run
 from reference.mitsuba_scene import MitsubaScene
 from reference.random_scenes import random_scene
 from tracer import canvas as canvas_module
-from tracer import device_scene, device_shapes, intersection, light_tables, queries
+from tracer import device_scene, device_shapes, light_tables, queries, surface
 from tracer.canvas import DeviceCanvas
 from tracer.material import Material
 from tracer.ray import Hit, Ray, keep_nearer
@@ -35,7 +35,7 @@ RAYS = 3_000
 def normal_flipped(patch: pytest.MonkeyPatch) -> None:
     true = SphereSlot.surface
     patch.setitem(
-        intersection.ANALYTIC_SURFACES,
+        surface.ANALYTIC_SURFACES,
         device_shapes.SPHERE,
         lambda row, p: (true(row, p)[0], -true(row, p)[1]),
     )
@@ -130,7 +130,7 @@ def shadow_rays_too_long(patch: pytest.MonkeyPatch) -> None:
 
 
 def mirror_about_another_normal(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(intersection, "mirror_direction", lambda d, n: dr.fma(-1.999999 * dr.dot(n, d), n, d))
+    patch.setattr(surface, "mirror_direction", lambda d, n: dr.fma(-1.999999 * dr.dot(n, d), n, d))
 
 
 def no_departure(patch: pytest.MonkeyPatch) -> None:

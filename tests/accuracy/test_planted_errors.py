@@ -12,7 +12,7 @@ import pytest
 
 import tracer
 from tests.accuracy import test_against_plain, test_creases, test_exact_optics, test_self_hits, worlds
-from tracer import intersection, spawn, whitted
+from tracer import spawn, surface, whitted
 from tracer.acceleration import traverse
 from tracer.ray import Ray
 from tracer.shapes.sphere import SphereSlot
@@ -22,7 +22,7 @@ Plant = Callable[[pytest.MonkeyPatch], None]
 
 def flipped_normal(patch: pytest.MonkeyPatch) -> None:
     true = SphereSlot.surface
-    patch.setitem(intersection.ANALYTIC_SURFACES, 1, lambda row, p: (true(row, p)[0], -true(row, p)[1]))
+    patch.setitem(surface.ANALYTIC_SURFACES, 1, lambda row, p: (true(row, p)[0], -true(row, p)[1]))
 
 
 def inverted_eta(patch: pytest.MonkeyPatch) -> None:
@@ -31,7 +31,7 @@ def inverted_eta(patch: pytest.MonkeyPatch) -> None:
 
 
 def mirror_through(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(intersection, "mirror_direction", lambda d, n: dr.fma(-1.999999 * dr.dot(n, d), n, d))
+    patch.setattr(surface, "mirror_direction", lambda d, n: dr.fma(-1.999999 * dr.dot(n, d), n, d))
 
 
 def unnormalized_weights(patch: pytest.MonkeyPatch) -> None:
