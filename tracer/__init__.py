@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, Any
 from tracer.llvm import select_llvm
 
 if TYPE_CHECKING:
+    from tracer.chains import Paths, trace_path
     from tracer.errors import MachineError, OutputError, SceneError, TracerError, UsageError
     from tracer.film.result import Result
     from tracer.lens import pixel_tree
-    from tracer.queries import Hits, Paths, intersect, trace_path, visible
+    from tracer.queries import Hits, intersect, visible
     from tracer.ray_tree import PixelTree, RayNode
     from tracer.render import RenderInterrupted, render
     from tracer.scene import Scene, json_schema, load
@@ -48,11 +49,12 @@ __all__ = [
 ]
 
 _NAMES_OF_MODULES = {
+    "tracer.chains": ("Paths", "trace_path"),
     "tracer.errors": ("MachineError", "OutputError", "SceneError", "TracerError", "UsageError"),
     "tracer.film.result": ("Result",),
     "tracer.lens": ("pixel_tree",),
     "tracer.ray_tree": ("PixelTree", "RayNode"),
-    "tracer.queries": ("Hits", "Paths", "intersect", "trace_path", "visible"),
+    "tracer.queries": ("Hits", "intersect", "visible"),
     "tracer.render": ("RenderInterrupted", "render"),
     "tracer.scene": ("Scene", "json_schema", "load"),
     "tracer.version": ("__version__",),

@@ -18,7 +18,7 @@ from reference.comparison import Outcome, cameras, find_terms, run
 from reference.mitsuba_scene import MitsubaScene
 from reference.random_scenes import random_scene
 from tracer import canvas as canvas_module
-from tracer import device_scene, device_shapes, light_tables, queries, surface
+from tracer import chains, device_scene, device_shapes, light_tables, queries, surface
 from tracer.canvas import DeviceCanvas
 from tracer.material import Material
 from tracer.ray import Hit, Ray, keep_nearer
@@ -42,30 +42,30 @@ def normal_flipped(patch: pytest.MonkeyPatch) -> None:
 
 
 def eta_inverted(patch: pytest.MonkeyPatch) -> None:
-    true = queries.refract_direction
-    patch.setattr(queries, "refract_direction", lambda d, n, ior, entering: true(d, n, dr.rcp(ior), entering))
+    true = chains.refract_direction
+    patch.setattr(chains, "refract_direction", lambda d, n, ior, entering: true(d, n, dr.rcp(ior), entering))
 
 
 def total_reflection_ignored(patch: pytest.MonkeyPatch) -> None:
     """The ray goes straight on where it should not get out."""
-    true = queries.refract_direction
+    true = chains.refract_direction
 
     def always_out(d: Any, n: Any, ior: Any, entering: Any) -> tuple[Any, Any]:
         bent, total = true(d, n, ior, entering)
         return dr.select(total, d, bent), total & False
 
-    patch.setattr(queries, "refract_direction", always_out)
+    patch.setattr(chains, "refract_direction", always_out)
 
 
 def ray_offset(patch: pytest.MonkeyPatch) -> None:
     """Secondary rays start 1e-3 S off their surface."""
-    true, extent = queries.leave, 0.01
+    true, extent = chains.leave, 0.01
 
     def pushed(ray: Ray, surface: Any, d: Any, crosses: bool) -> Ray:
         away = true(ray, surface, d, crosses)
         return replace(away, o=away.o + (-1e-3 if crosses else 1e-3) * extent * surface.lit_side)
 
-    patch.setattr(queries, "leave", pushed)
+    patch.setattr(chains, "leave", pushed)
 
 
 def depth_from_the_eye(patch: pytest.MonkeyPatch) -> None:
@@ -106,7 +106,8 @@ def triangle_dropped(patch: pytest.MonkeyPatch) -> None:
 
 def single_for_double(patch: pytest.MonkeyPatch) -> None:
     true = queries.find_backend
-    patch.setattr(queries, "find_backend", lambda name, precision: true(name, "single"))
+    for module in (queries, chains):
+        patch.setattr(module, "find_backend", lambda name, precision: true(name, "single"))
 
 
 def radius_off(patch: pytest.MonkeyPatch) -> None:
@@ -209,13 +210,13 @@ def sphere_met_again_from_inside(patch: pytest.MonkeyPatch) -> None:
 
 
 def bent_by_index_1(patch: pytest.MonkeyPatch) -> None:
-    true = queries.refract_direction
+    true = chains.refract_direction
 
     def bent(d: Any, n: Any, ior: Any, entering: Any) -> tuple[Any, Any]:
         way, total = true(d, n, ior, entering)
         return dr.select(ior == 1, way + 1e-6 * n, way), total
 
-    patch.setattr(queries, "refract_direction", bent)
+    patch.setattr(chains, "refract_direction", bent)
 
 
 def sub_rays_off(patch: pytest.MonkeyPatch) -> None:

@@ -21,7 +21,7 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"scene"}),
     frozenset({"device_scene"}),
     frozenset({"whitted"}),
-    frozenset({"render", "queries"}),
+    frozenset({"render", "queries", "chains"}),
     frozenset({"viewer"}),
     frozenset({"cli"}),
 )
