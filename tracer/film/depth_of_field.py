@@ -8,7 +8,6 @@ first-pass colors. All arithmetic is in double precision on the depth as stored.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -17,6 +16,7 @@ import numpy as np
 from tracer.backends import Backend, find_backend
 from tracer.camera import DepthOfField
 from tracer.canvas import Canvas
+from tracer.film.first_pass import FirstPass, eye_distance
 from tracer.random import DEPTH_OF_FIELD_STREAM, below, philox
 from tracer.tiles import Rectangle
 
@@ -27,10 +27,6 @@ LARGE_WINDOW = 4096
 """Pixels of a window above which a draw guesses among the pixels of similar distance, if those are fewer."""
 
 LARGEST_REACH = 1 << 20
-
-SEARCHED = (1 << 24, 1 << 30)
-"""Pixels among which the similar ones are searched, the real ones or more: each of the two is a kernel of its
-own, and not every number of pixels that are not blank."""
 
 PIXELS_PER_LAUNCH = 1 << 18
 """Few enough for an answer to Ctrl-C."""
@@ -64,41 +60,6 @@ def rectangle_needed(
     )
 
 
-@dataclass
-class _FirstPass:
-    """The picture that the filter reads, in Dr.Jit memory, for the rectangle x0, y0 .. x1, y1.
-
-    `by_distance`, where windows are large: distances from the eye in rising order, and the pixels that have
-    them, row times 65536 plus column.
-    """
-
-    color: Any
-    depth: Any
-    x0: int
-    y0: int
-    x1: int
-    y1: int
-    by_distance: tuple[Any, Any] | None = None
-
-    def index(self, backend: Backend, column: Any, row: Any) -> Any:
-        """Place of a pixel of the full picture in the arrays."""
-        width = backend.opaque_id(self.x1 - self.x0)
-        return (row - backend.opaque_id(self.y0)) * width + (column - backend.opaque_id(self.x0))
-
-    def sort_by_distance(self, backend: Backend, canvas: Canvas) -> None:
-        """Fills `by_distance`; of equal distances the lower pixel comes first."""
-        width = self.x1 - self.x0
-        lane = dr.arange(backend.UInt32, width * (self.y1 - self.y0))
-        row = lane // backend.opaque_id(width)
-        column = lane - row * backend.opaque_id(width) + self.x0
-        row = row + self.y0
-        distance = (_eye_distance(backend, canvas, column, row) + self.depth).numpy()
-        order = np.argsort(np.where(self.depth.numpy() > 0, distance, np.inf), kind="stable")
-        order = order[: np.count_nonzero(self.depth.numpy() > 0)]
-        places = (row.numpy()[order] << np.uint32(16)) | column.numpy()[order]
-        self.by_distance = backend.table(distance[order]), backend.id_table(places)
-
-
 def depth_of_field(
     backend: Backend,
     color: np.ndarray,
@@ -113,7 +74,7 @@ def depth_of_field(
     `color` (h', w', 3), `depth` (h', w'): the first pass, at least over `rectangle_needed`.
     """
     double = find_backend(backend.name, "double")
-    first = _FirstPass(double.table(color), double.table(depth), *source)
+    first = FirstPass(double.table(color), double.table(depth), *source)
     if (2 * blur_reach(depth, settings, canvas) + 1) ** 2 > LARGE_WINDOW:
         first.sort_by_distance(double, canvas)
     x0, y0, x1, y1 = target
@@ -134,7 +95,7 @@ def depth_of_field(
 
 @dr.syntax
 def _filter(
-    backend: Backend, first: _FirstPass, column: Any, row: Any, settings: DepthOfField, canvas: Canvas
+    backend: Backend, first: FirstPass, column: Any, row: Any, settings: DepthOfField, canvas: Canvas
 ) -> Any:
     # ---- Window and admissible range of every pixel ----
     width = dr.width(column)
@@ -148,7 +109,7 @@ def _filter(
     reach = backend.UInt32(dr.minimum(dr.maximum(steps, 0), LARGEST_REACH))
     low_column, columns = _window(backend, column, reach, first.x0, first.x1)
     low_row, rows = _window(backend, row, reach, first.y0, first.y1)
-    eye = _eye_distance(backend, canvas, column, row) + x
+    eye = eye_distance(backend, canvas, column, row) + x
     depth_range = backend.opaque(
         0.1 * settings.focus if settings.depth_range is None else settings.depth_range
     )
@@ -162,7 +123,7 @@ def _filter(
     by_distance = dr.full(backend.Bool, False, width)
     similar: Any = first.by_distance
     if dr.hint(similar is not None, mode="scalar"):
-        begin, count = _similar(backend, first, eye, depth_range)
+        begin, count = first.similar(backend, eye, depth_range)
         by_distance = (size > LARGE_WINDOW) & (count < size)
         size = dr.select(by_distance, count, size)
 
@@ -190,8 +151,8 @@ def _filter(
             at_column = dr.select(by_distance, place & 0xFFFF, at_column)
             at_row = dr.select(by_distance, place >> 16, at_row)
         in_window = (at_column - low_column < columns) & (at_row - low_row < rows)
-        fits = in_window & _admissible(
-            backend, first, canvas, at_column, at_row, eye, depth_range, in_window & active
+        fits = in_window & first.admissible(
+            backend, canvas, at_column, at_row, eye, depth_range, in_window & active
         )
         chosen = (admissible > 0) & (passed == below(words[0], admissible))
         taken = active & fits & (guesses | chosen)
@@ -214,51 +175,9 @@ def _filter(
     return own + total / backend.Float(samples)
 
 
-def _similar(backend: Backend, first: _FirstPass, eye: Any, depth_range: Any) -> tuple[Any, Any]:
-    """The pixels whose distance differs by less than the range: their first place in the order, their
-    count."""
-    assert first.by_distance is not None
-    distances = first.by_distance[0]
-    end_of_search = next(size for size in SEARCHED if size >= dr.width(distances))
-    count = backend.opaque_id(dr.width(distances))
-
-    def difference(place: Any) -> Any:
-        return dr.gather(backend.Float, distances, place, place < count) - eye
-
-    begin = dr.binary_search(0, end_of_search, lambda i: (i < count) & (difference(i) <= -depth_range))
-    end = dr.binary_search(0, end_of_search, lambda i: (i < count) & (difference(i) < depth_range))
-    return backend.UInt32(begin), backend.UInt32(end) - backend.UInt32(begin)
-
-
 def _window(backend: Backend, center: Any, reach: Any, low: int, high: int) -> tuple[Any, Any]:
     """First coordinate and length of the window [center - reach, center + reach] within low .. high - 1."""
     low_id, last = backend.opaque_id(low), backend.opaque_id(high - 1)
     begin = dr.select(center - low_id > reach, center - reach, low_id)
     end = dr.select(last - center > reach, center + reach, last)
     return begin, end - begin + 1
-
-
-def _eye_distance(backend: Backend, canvas: Canvas, column: Any, row: Any) -> Any:
-    """|P - e| for the centers of pixels."""
-    size = backend.opaque(canvas.pixel_size)
-    x = (backend.Float(column) + 0.5 - backend.opaque(canvas.width / 2)) * size
-    y = (backend.Float(row) + 0.5 - backend.opaque(canvas.height / 2)) * size
-    distance = backend.opaque(canvas.distance)
-    return dr.sqrt(distance * distance + x * x + y * y)
-
-
-def _admissible(
-    backend: Backend,
-    first: _FirstPass,
-    canvas: Canvas,
-    column: Any,
-    row: Any,
-    eye: Any,
-    depth_range: Any,
-    active: Any,
-) -> Any:
-    """Mask: the pixel is not blank and its distance from the eye differs from `eye` by less than the
-    range."""
-    depth = dr.gather(backend.Float, first.depth, first.index(backend, column, row), active)
-    distance = _eye_distance(backend, canvas, column, row) + depth
-    return (depth > 0) & (dr.abs(distance - eye) < depth_range)
