@@ -10,18 +10,17 @@ import numpy as np
 
 from tracer.backends import exact_arithmetic, find_backend
 from tracer.canvas import DeviceCanvas
-from tracer.color import decode_srgb
-from tracer.device_meshes import inherited
-from tracer.device_scene import DeviceScene, compile_scene, weight_floor
+from tracer.device_scene import DeviceScene, compile_scene
 from tracer.errors import UsageError
 from tracer.intersection import closest_hit
-from tracer.lens_lights import LightsUnderTheLens, name_of, picked, triple
+from tracer.lens_lights import LightsUnderTheLens, picked
+from tracer.lens_nodes import Columns, NodesUnderTheLens
 from tracer.pixels import PixelGrid
-from tracer.ray_tree import EndedRay, HitPoint, LightTerm, PixelTree, RayNode
+from tracer.ray_tree import PixelTree, RayNode
 from tracer.scene import Scene
 from tracer.settings import Settings, picture_canvas, with_seed
-from tracer.spawn import MaterialRow, material_at, spawn
-from tracer.surface import Surface, surface_at
+from tracer.spawn import material_at, spawn
+from tracer.surface import surface_at
 from tracer.textures.tables import texture_color
 from tracer.whitted import primary_path, texture_point
 
@@ -86,8 +85,6 @@ class _Lens:
     def __init__(self, scene: Scene, device: DeviceScene) -> None:
         self.scene, self.device, self.backend = scene, device, device.backend
         self.lights = LightsUnderTheLens(scene, device)
-        background = np.array(scene.background)
-        self.background = decode_srgb(background) if scene.color_space == "linear" else background
 
     def look(self, canvas: DeviceCanvas, x: int, y: int, number: int, n: int) -> list[RayNode]:
         """The trees of the pixel's sub-rays."""
@@ -99,7 +96,7 @@ class _Lens:
         self.pixel = number
         active = dr.full(backend.Bool, True, width)
         pixels = PixelGrid(lane, backend.opaque_id(count), column, row, numbers, backend.opaque_id(n), active)
-        self.share = 1 / count
+        self.nodes = NodesUnderTheLens(self.scene, self.device, 1 / count)
         roots: list[RayNode] = []
         level: _Level | None = _Level(
             primary_path(self.device, canvas, pixels, lane),
@@ -129,77 +126,14 @@ class _Lens:
         number = dr.opaque(backend.UInt32, self.pixel, width)
         sub_ray = backend.id_table(level.sub_rays)
         lights = self.lights.terms(rays, path, surface, material, hit.valid, number, sub_ray)
-        seen = _Columns(width, path, hit, surface, material, own, children)
-        nodes = [self._node(level, seen, i, lights[i]) for i in range(rays)]
+        seen = Columns(width, path, hit, surface, material, own, children)
+        told = zip(level.kinds, level.factors, lights, strict=True)
+        nodes = [self.nodes.node(*each, seen, i) for i, each in enumerate(told)]
         for home, node in zip(level.homes, nodes, strict=True):
             home.append(node)
         return self._next(level, nodes, children, seen)
 
-    def _node(self, level: _Level, seen: _Columns, i: int, lights: tuple[LightTerm, ...]) -> RayNode:
-        worth = seen.throughput[i] * self.share
-        node = RayNode(
-            kind=level.kinds[i],
-            level=int(seen.level[i]),
-            factor=level.factors[i],
-            weight=float(seen.weight[i]),
-            worth=triple(worth),
-            origin=triple(seen.o[i]),
-            direction=triple(seen.d[i]),
-            hit=None,
-        )
-        if not seen.valid[i]:
-            if node.level == 0 or self.scene.secondary_background:
-                node.ambient = triple(worth * self.background)
-            return node
-        hit = node.hit = self._hit_point(seen, i)
-        a, lit = self.scene.ambient, worth * hit.color
-        direct = (1 - a) * hit.absorption * lit
-        node.lights = lights
-        node.ambient = triple(a * lit)
-        node.diffuse = triple(hit.diffuse * direct * _sum(light.diffuse for light in lights))
-        node.specular = triple(hit.specular * direct * _sum(light.specular for light in lights))
-        node.ended = tuple(self._ended(node, seen, i))
-        return node
-
-    def _hit_point(self, seen: _Columns, i: int) -> HitPoint:
-        number = int(seen.shape[i])
-        shape = self.scene.shapes[number]
-        return HitPoint(
-            shape=number,
-            name=name_of(self.scene, number),
-            primitive=int(seen.primitive[i]) - int(self.device.host.first_primitive[number]),
-            t=float(seen.t[i]),
-            position=triple(seen.p[i]),
-            normal=triple(seen.normal[i]),
-            entering=bool(seen.entering[i]),
-            texture=inherited(self.scene, shape, "texture") or "",
-            color=triple(seen.own[i]),
-            absorption=float(seen.absorption[i]),
-            diffuse=float(seen.diffuse[i]),
-            specular=float(seen.specular[i]),
-        )
-
-    def _ended(self, node: RayNode, seen: _Columns, i: int) -> list[EndedRay]:
-        """The children with a share that are not traced."""
-        total = bool(seen.total[i])
-        ended = []
-        for kind, k, traced in (
-            ("reflected", seen.reflection[i], seen.reflects[i]),
-            ("refracted", seen.refraction[i], seen.refracts[i]),
-        ):
-            if k == 0 or traced:
-                continue
-            weight = node.weight * float(k)
-            if kind == "refracted" and total and not self.device.options.tir_reflects:
-                reason = "total reflection"
-            else:
-                reason = "cut off" if weight <= weight_floor(self.scene.cutoff) else "too deep"
-            ended.append(
-                EndedRay("total_reflection" if kind == "refracted" and total else kind, weight, reason)
-            )
-        return ended
-
-    def _next(self, level: _Level, nodes: list[RayNode], children: Any, seen: _Columns) -> _Level | None:
+    def _next(self, level: _Level, nodes: list[RayNode], children: Any, seen: Columns) -> _Level | None:
         """The children that are traced, those of one ray side by side."""
         rows = [
             (i, is_mirrored)
@@ -225,39 +159,3 @@ class _Lens:
             [float((seen.reflection if one else seen.refraction)[i]) for i, one in rows],
             [nodes[i].children for i in parents],
         )
-
-
-class _Columns:
-    """What is known of the rays of a level, in host memory: (n,) or (n, 3), double precision where real."""
-
-    def __init__(
-        self,
-        count: int,
-        path: Any,
-        hit: Any,
-        surface: Surface,
-        material: MaterialRow,
-        own: Any,
-        children: Any,
-    ) -> None:
-        def column(values: Any) -> np.ndarray:
-            array = values.numpy()
-            array = array.T if array.ndim == 2 else array
-            array = np.broadcast_to(array, (count, *array.shape[1:]))
-            return array.astype(np.float64) if array.dtype.kind == "f" else array
-
-        self.o, self.d, self.throughput = column(path.o), column(path.d), column(path.throughput)
-        self.weight, self.level = column(path.weight), column(path.level)
-        self.t, self.primitive, self.valid = column(hit.t), column(hit.primitive), column(hit.valid)
-        self.shape, self.p, self.normal = column(surface.shape), column(surface.p), column(surface.normal)
-        self.entering = column(surface.entering)
-        self.own = column(own)
-        self.absorption, self.reflection = column(material.absorption), column(material.reflection)
-        self.refraction = column(material.refraction)
-        self.diffuse, self.specular = column(material.finish.diffuse), column(material.finish.specular)
-        self.reflects, self.refracts = column(children.reflects), column(children.refracts)
-        self.total = column(children.total)
-
-
-def _sum(terms: Any) -> np.ndarray:
-    return np.sum([np.zeros(3), *terms], axis=0)
