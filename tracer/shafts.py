@@ -135,8 +135,8 @@ def _power(backend: Backend, size: Any, radius: Any) -> Any:
 @dataclass
 class Suspects:
     """Who may hide a light from n points: `spheres` (n,) one bit for each sphere that stands in the kernel,
-    in their order, None where they were not looked at; masks `many` and `meshes` (n,): one of many spheres in a table, a mesh; `umbra` (n,)
-    mask: something opaque certainly hides all samples of the light."""
+    in their order, None where they were not looked at; masks `many` and `meshes` (n,): one of many spheres in
+    a table, a mesh; `umbra` (n,) mask: something opaque certainly hides all samples of the light."""
 
     spheres: Any
     many: Any
