@@ -28,6 +28,9 @@ Precision = Literal["single", "double"]
 INVALID = 0xFFFFFFFF
 """Marks "no primitive", "no shape" wherever ids are unsigned."""
 
+CACHE_LINE = 64
+"""Bytes."""
+
 
 @dataclass(frozen=True)
 class Backend:
@@ -77,23 +80,33 @@ class Backend:
         Only such memory is read in whole packets; a zero-copy view of NumPy's memory is not, at half the
         speed.
         """
-        return _aligned(self.Float, np.ascontiguousarray(rows, self.dtype).ravel(), self.UInt32)
+        return _aligned(self.Float, np.asarray(rows, self.dtype), self.UInt32)
 
     def single_table(self, rows: Any) -> Any:
         """Uploads numbers in single precision, whatever the precision of `Float`, like `table`."""
-        return _aligned(dr.value_t(self.SingleN), np.ascontiguousarray(rows, np.float32).ravel(), self.UInt32)
+        return _aligned(dr.value_t(self.SingleN), np.asarray(rows, np.float32), self.UInt32)
 
     def id_table(self, ids: Any) -> Any:
         """Uploads unsigned integers, like `table`."""
-        return _aligned(self.UInt32, np.ascontiguousarray(ids, np.uint32).ravel(), self.UInt32)
+        return _aligned(self.UInt32, np.asarray(ids, np.uint32), self.UInt32)
 
 
 def _aligned(array_type: Any, values: np.ndarray, index_type: Any) -> Any:
-    source = array_type(values)
-    target = dr.empty(array_type, len(values))
-    dr.scatter(target, source, dr.arange(index_type, len(values)))
+    source = array_type(_on_a_line(values))
+    target = dr.empty(array_type, len(source))
+    dr.scatter(target, source, dr.arange(index_type, len(source)))
     dr.eval(target)
     return target
+
+
+def _on_a_line(values: np.ndarray) -> np.ndarray:
+    """A flat copy that begins where a line of the cache does. NumPy's own memory begins there now and then,
+    and for each of the two cases Dr.Jit would compile a kernel of its own."""
+    room = np.empty(values.nbytes + CACHE_LINE, np.uint8)
+    first = -room.ctypes.data % CACHE_LINE
+    copy = room[first : first + values.nbytes].view(values.dtype)
+    copy.reshape(values.shape)[...] = values
+    return copy
 
 
 def find_backend(name: str = "auto", precision: str = "single", gradients: bool = False) -> Backend:
