@@ -74,9 +74,8 @@ def depth_of_field(
     `color` (h', w', 3), `depth` (h', w'): the first pass, at least over `rectangle_needed`.
     """
     double = find_backend(backend.name, "double")
-    first = FirstPass(double.table(color), double.table(depth), *source)
-    if (2 * blur_reach(depth, settings, canvas) + 1) ** 2 > LARGE_WINDOW:
-        first.sort_by_distance(double, canvas)
+    large = (2 * blur_reach(depth, settings, canvas) + 1) ** 2 > LARGE_WINDOW
+    first = FirstPass.of(double, color, depth, source, canvas, large)
     x0, y0, x1, y1 = target
     width, height = x1 - x0, y1 - y0
     result = np.empty((height, width, 3), color.dtype)
@@ -119,13 +118,9 @@ def _filter(
 
     # ---- Where to draw from: the window, or the pixels of similar distance if those are fewer ----
     size = columns * rows
-    begin = dr.zeros(backend.UInt32, width)
-    by_distance = dr.full(backend.Bool, False, width)
-    similar: Any = first.by_distance
-    if dr.hint(similar is not None, mode="scalar"):
-        begin, count = first.similar(backend, eye, depth_range)
-        by_distance = (size > LARGE_WINDOW) & (count < size)
-        size = dr.select(by_distance, count, size)
+    begin, count = first.similar(backend, canvas, eye, depth_range)
+    by_distance = (size > LARGE_WINDOW) & (count < size)
+    size = dr.select(by_distance, count, size)
 
     # ---- Draws ----
     # Every turn looks at one pixel of that set. A draw guesses; after 64 misses the set is walked, once to
@@ -140,16 +135,15 @@ def _filter(
     walk_column, walk_row = low_column + 0, low_row + 0
     one, none = backend.UInt32(1), backend.UInt32(0)
     active = sharp & (reach > 0)
-    while dr.hint(active, label="depth of field", exclude=[backend, first, canvas, settings, similar]):
+    while dr.hint(active, label="depth of field", exclude=[backend, first, canvas, settings]):
         words = philox(key, (pixel, drawn, attempt, backend.UInt32(0)))
         guesses = attempt < ATTEMPTS
         at_column = dr.select(guesses, low_column + below(words[0], columns), walk_column)
         at_row = dr.select(guesses, low_row + below(words[1], rows), walk_row)
-        if dr.hint(similar is not None, mode="scalar"):
-            rank = begin + dr.select(guesses, below(words[0], size), walked)
-            place = dr.gather(backend.UInt32, similar[1], rank, by_distance & active)
-            at_column = dr.select(by_distance, place & 0xFFFF, at_column)
-            at_row = dr.select(by_distance, place >> 16, at_row)
+        rank = begin + dr.select(guesses, below(words[0], size), walked)
+        place = dr.gather(backend.UInt32, first.pixels, rank, by_distance & active)
+        at_column = dr.select(by_distance, place & 0xFFFF, at_column)
+        at_row = dr.select(by_distance, place >> 16, at_row)
         in_window = (at_column - low_column < columns) & (at_row - low_row < rows)
         fits = in_window & first.admissible(
             backend, canvas, at_column, at_row, eye, depth_range, in_window & active

@@ -10,18 +10,19 @@ import numpy as np
 
 from tracer.backends import Backend
 from tracer.canvas import Canvas
+from tracer.tiles import Rectangle
 
 SEARCHED = (1 << 24, 1 << 30)
-"""Pixels among which the similar ones are searched, the real ones or more: each of the two is a kernel of its
-own, and not every number of pixels that are not blank."""
+"""Pixels among which the similar ones are searched, those of the picture or more: each of the two is a kernel
+of its own, and not every number of pixels."""
 
 
 @dataclass
 class FirstPass:
     """The picture that the filter reads, in Dr.Jit memory, for the rectangle x0, y0 .. x1, y1.
 
-    `by_distance`, where windows are large: distances from the eye in rising order, and the pixels that have
-    them, row times 65536 plus column.
+    `distances` from the eye in rising order, and the `pixels` that have them, row times 65536 plus column;
+    where no window is large, two of which nobody draws, so that it is the same kernel.
     """
 
     color: Any
@@ -30,36 +31,31 @@ class FirstPass:
     y0: int
     x1: int
     y1: int
-    by_distance: tuple[Any, Any] | None = None
+    distances: Any
+    pixels: Any
+
+    @staticmethod
+    def of(
+        backend: Backend, color: np.ndarray, depth: np.ndarray, source: Rectangle, canvas: Canvas, large: bool
+    ) -> FirstPass:
+        """From colors (h, w, 3) and depths (h, w) of a rectangle; `large`: some window is."""
+        distances, pixels = _by_distance(depth, source, canvas) if large else (np.zeros(2), np.zeros(2))
+        tables = backend.table(distances), backend.id_table(pixels)
+        return FirstPass(backend.table(color), backend.table(depth), *source, *tables)
 
     def index(self, backend: Backend, column: Any, row: Any) -> Any:
         """Place of a pixel of the full picture in the arrays."""
         width = backend.opaque_id(self.x1 - self.x0)
         return (row - backend.opaque_id(self.y0)) * width + (column - backend.opaque_id(self.x0))
 
-    def sort_by_distance(self, backend: Backend, canvas: Canvas) -> None:
-        """Fills `by_distance`; of equal distances the lower pixel comes first."""
-        width = self.x1 - self.x0
-        lane = dr.arange(backend.UInt32, width * (self.y1 - self.y0))
-        row = lane // backend.opaque_id(width)
-        column = lane - row * backend.opaque_id(width) + self.x0
-        row = row + self.y0
-        distance = (eye_distance(backend, canvas, column, row) + self.depth).numpy()
-        order = np.argsort(np.where(self.depth.numpy() > 0, distance, np.inf), kind="stable")
-        order = order[: np.count_nonzero(self.depth.numpy() > 0)]
-        places = (row.numpy()[order] << np.uint32(16)) | column.numpy()[order]
-        self.by_distance = backend.table(distance[order]), backend.id_table(places)
-
-    def similar(self, backend: Backend, eye: Any, depth_range: Any) -> tuple[Any, Any]:
+    def similar(self, backend: Backend, canvas: Canvas, eye: Any, depth_range: Any) -> tuple[Any, Any]:
         """The pixels whose distance differs from `eye` (n,) by less than the range: their first place in the
         order, their count."""
-        assert self.by_distance is not None
-        distances = self.by_distance[0]
-        end_of_search = next(size for size in SEARCHED if size >= dr.width(distances))
-        count = backend.opaque_id(dr.width(distances))
+        end_of_search = next(size for size in SEARCHED if size >= canvas.width * canvas.height)
+        count = backend.opaque_id(dr.width(self.distances))
 
         def difference(place: Any) -> Any:
-            return dr.gather(backend.Float, distances, place, place < count) - eye
+            return dr.gather(backend.Float, self.distances, place, place < count) - eye
 
         begin = dr.binary_search(0, end_of_search, lambda i: (i < count) & (difference(i) <= -depth_range))
         end = dr.binary_search(0, end_of_search, lambda i: (i < count) & (difference(i) < depth_range))
@@ -80,6 +76,19 @@ class FirstPass:
         depth = dr.gather(backend.Float, self.depth, self.index(backend, column, row), active)
         distance = eye_distance(backend, canvas, column, row) + depth
         return (depth > 0) & (dr.abs(distance - eye) < depth_range)
+
+
+def _by_distance(depth: np.ndarray, source: Rectangle, canvas: Canvas) -> tuple[np.ndarray, np.ndarray]:
+    """Distances from the eye in rising order, and the pixels that have them, row times 65536 plus column;
+    of equal distances the lower pixel comes first. `depth` (h, w): of `source`."""
+    rows, columns = np.nonzero(depth > 0)
+    own = depth[rows, columns].astype(np.float64)
+    columns, rows = columns + source[0], rows + source[1]
+    x = (columns + 0.5 - canvas.width / 2) * canvas.pixel_size
+    y = (rows + 0.5 - canvas.height / 2) * canvas.pixel_size
+    distance = np.sqrt(canvas.distance * canvas.distance + x * x + y * y) + own  # rounded as in the kernel
+    order = np.argsort(distance, kind="stable")
+    return distance[order], (rows << 16 | columns)[order]
 
 
 def eye_distance(backend: Backend, canvas: Canvas, column: Any, row: Any) -> Any:
