@@ -113,18 +113,18 @@ class DeviceScene:
 _LAST: LastScenes[DeviceScene] = LastScenes(variants=2, megabytes=256)
 
 
-def compile_scene(scene: Scene, backend: Backend) -> DeviceScene:
+def compile_scene(scene: Scene, backend: Backend, animated: bool = False) -> DeviceScene:
     """The tables of a scene, those of the last time where nothing but the camera has changed; raises
-    `SceneError` for files that cannot be used."""
+    `SceneError` for files that cannot be used. `animated`: see `compile_lights`."""
 
     def make() -> tuple[DeviceScene, Iterator[Path]]:
-        device = _compiled(scene, backend)
+        device = _compiled(scene, backend, animated)
         return device, (file for mesh in device.host.meshes.values() for file in mesh.data.files)
 
-    return _LAST.get(scene, backend, make)
+    return _LAST.get(scene, (backend, animated), make)
 
 
-def _compiled(scene: Scene, backend: Backend) -> DeviceScene:
+def _compiled(scene: Scene, backend: Backend, animated: bool) -> DeviceScene:
     meshes = placed_meshes(scene)
     counts = [len(meshes[i].corners) if i in meshes else 1 for i in range(len(scene.shapes))]
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
@@ -165,6 +165,7 @@ def _compiled(scene: Scene, backend: Backend) -> DeviceScene:
             decode(np.array([light.color for light in scene.lights]).reshape(-1, 3)),
             planes,
             scene.seed,
+            animated,
         ),
         ambient=backend.opaque(scene.ambient),
         not_ambient=backend.opaque(1 - scene.ambient),

@@ -21,10 +21,10 @@ from tracer.suspects import find_suspects
 
 @dataclass
 class Shadows:
-    """What is known of triangles between lights of one sample and hits: mask `known` (n,) of those hits, and
-    for the first few of such lights whether one is `hidden` (n,)."""
+    """What is known of triangles between lights of one sample and hits, for the first few of such lights:
+    masks, whether it is `known` (n,) of a hit, and that one is `hidden` (n,)."""
 
-    known: Any
+    known: list[Any]
     hidden: list[Any]
 
 
@@ -103,12 +103,13 @@ def _dark_samples(
     if not lights or not (crowded or any(areas)):
         return dark
     suspects, todo = [], dr.zeros(backend.UInt32, width)
-    known = [] if shadows is None else list(shadows.hidden)
+    found = [] if shadows is None else list(zip(shadows.known, shadows.hidden, strict=True))
     for light, faces, is_area in zip(lights, facing, areas, strict=True):
         who = find_suspects(scene, surface, light.ball, faces, spheres=any(areas), beams=is_area)
-        if shadows is not None and known and not is_area:
-            who.meshes &= ~shadows.known
-            who.umbra |= shadows.known & known.pop(0)
+        if found and not is_area:
+            known, is_hidden = found.pop(0)
+            who.meshes &= ~known
+            who.umbra |= known & is_hidden
         bits = ((1 << len(light.samples)) - 1) << light.first
         # Of spheres by themselves only area lights are asked here.
         asked = who.doubtful & (is_area | who.meshes | who.many)

@@ -20,12 +20,12 @@ from tracer.acceleration.triangle import TriangleTables
 from tracer.backends import INVALID
 from tracer.canvas import Canvas, DeviceCanvas
 from tracer.device_scene import DeviceScene
-from tracer.first_shadows import first_shadows
+from tracer.first_shadows import first_shadows, lights_asked
 from tracer.intersection import closest_triangle, free_ray, known_triangle
 from tracer.leaving import departure
 from tracer.pixels import Lanes, numbered_rays
 from tracer.ray import Hit, Ray, keep_nearer, no_hit, select_min
-from tracer.replay import Program
+from tracer.replay import FirstTimes, Program
 from tracer.surface import slot_of
 
 FEWEST_RAYS = 1 << 18
@@ -39,41 +39,69 @@ SMALLEST_SHARE = 0.25
 """Where triangles take a smaller share of the picture, it takes as long to prepare bundles from a light as
 they save."""
 
+FEW_RAYS = 8 * RAYS
+"""Bundles are asked of so many, as many as the smallest launch has, where they do not pay and only their
+kernels are wanted."""
+
+_FIRST_TIME = FirstTimes()
+
 
 @dataclass
 class FirstHits:
     """What primary rays meet, of all lanes for their first sub-ray, then for the next (lanes n n,): the
     `slot` of the triangle that is first (`INVALID`: none, `DOUBTFUL`: the loop has to find it), and
-    where it is `HIDDEN` from the lights of `lights_asked`, a list that is empty where nobody has looked."""
+    for each of `lights_asked` where it is `HIDDEN` from that (or `DOUBTFUL`), a list that is empty where
+    nobody has looked."""
 
     slot: Any
     hidden: list[Any]
 
 
+def enough_for_bundles(rays: int) -> bool:
+    """Whether bundles may pay for so many rays."""
+    return rays >= FEWEST_RAYS
+
+
 def first_hits(
-    scene: DeviceScene, canvas: Canvas, device_canvas: DeviceCanvas, lanes: Lanes, n: int
+    scene: DeviceScene,
+    canvas: Canvas,
+    device_canvas: DeviceCanvas,
+    lanes: Lanes,
+    n: int,
+    animated: bool = False,
 ) -> FirstHits | None:
     """What primary rays of a launch meet first; None in a scene without triangles.
 
-    Whether bundles pay makes no difference to what is found.
+    Whether bundles pay makes no difference to what is found. `animated`: and none to which kernels the first
+    launch needs, so that no later one needs others.
     """
     if scene.triangles is None:
         return None
     index, rays = scene.backend.UInt32, lanes.count * n * n
     edge, share = _appearance(scene.triangles, canvas)
-    if rays < FEWEST_RAYS or edge < SMALLEST_EDGE:
-        return FirstHits(dr.opaque(index, DOUBTFUL, rays), [])
+    pay = enough_for_bundles(rays) and edge >= SMALLEST_EDGE
+    shadows_pay = pay and edge >= SMALLEST_SHADOW_EDGE and share >= SMALLEST_SHARE
+    every_kernel = animated and _FIRST_TIME(scene, device_canvas, lanes)
 
-    found = answers_to(
-        index,
-        rays,
-        lambda numbers, both: Found(**bundled(scene, device_canvas, lanes, numbers, both)),
-        lambda found, places, numbers: among(scene, device_canvas, lanes, found, places, numbers)["slot"],
-        lambda numbers: singly(scene, device_canvas, lanes, numbers)["slot"],
-    )
-    if edge < SMALLEST_SHADOW_EDGE or share < SMALLEST_SHARE:
-        return FirstHits(found, [])
-    return FirstHits(found, first_shadows(scene, device_canvas, lanes, found))
+    def found_in_bundles(rays: int) -> Any:
+        return answers_to(
+            index,
+            rays,
+            lambda numbers, both: Found(**bundled(scene, device_canvas, lanes, numbers, both)),
+            lambda found, places, numbers: among(scene, device_canvas, lanes, found, places, numbers)["slot"],
+            lambda numbers: singly(scene, device_canvas, lanes, numbers)["slot"],
+            every_kernel,
+        )
+
+    if every_kernel and not pay:
+        found_in_bundles(FEW_RAYS)
+    slot = found_in_bundles(rays) if pay else dr.opaque(index, DOUBTFUL, rays)
+    if shadows_pay:
+        return FirstHits(slot, first_shadows(scene, device_canvas, lanes, slot, every_kernel))
+    if every_kernel:
+        first_shadows(scene, device_canvas, lanes, dr.opaque(index, INVALID, FEW_RAYS), every_kernel)
+    lights = lights_asked(scene) if animated else []
+    return FirstHits(slot, [dr.opaque(index, DOUBTFUL, rays) for _ in lights])
 
 
 @Program

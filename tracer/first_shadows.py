@@ -51,9 +51,12 @@ def lights_asked(scene: DeviceScene) -> list[UnrolledLight]:
     return [light for light in scene.lights.unrolled if len(light.samples) == 1][:MOST_LIGHTS]
 
 
-def first_shadows(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, slots: Any) -> list[Any]:
+def first_shadows(
+    scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, slots: Any, every_kernel: bool = False
+) -> list[Any]:
     """For each of `lights_asked` and every primary ray of a launch (lanes n n,), `HIDDEN` where triangles
-    hide the light from the point that it meets first. `slots`: of the triangles that they meet."""
+    hide the light from the point that it meets first. `slots`: of the triangles that they meet;
+    `every_kernel`: see `answers_to`."""
     lights = lights_asked(scene)
     if not lights:
         return []
@@ -67,6 +70,7 @@ def first_shadows(scene: DeviceScene, canvas: DeviceCanvas, lanes: Lanes, slots:
             lambda numbers, both: Found(**bundled(scene, sample.position, where, numbers, both)),
             lambda found, places, numbers: among(question, found, places, numbers)["hidden"],
             lambda numbers: singly(question, numbers)["hidden"],
+            every_kernel,
         )
 
     return [

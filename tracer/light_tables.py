@@ -74,26 +74,39 @@ class LightTables:
         return len(self.balls) // 4
 
 
+NOTHING_LIT = np.array([0, 0, 0, -np.inf])
+"""In place of the ball around a light without weight: no surface faces it."""
+
+
 def compile_lights(
-    backend: Backend, lights: Sequence[LightRecord], colors: np.ndarray, planes: np.ndarray, seed: int
+    backend: Backend,
+    lights: Sequence[LightRecord],
+    colors: np.ndarray,
+    planes: np.ndarray,
+    seed: int,
+    animated: bool = False,
 ) -> LightTables:
     """Tables of the samples of all lights whose weight is not zero.
 
     `colors` (lights, 3): in the color space of the shading; `planes` (p, 4): n and d of the planes that have
-    bits.
+    bits; `animated`: where lights stand in the kernel, those without weight do, too, since in another frame
+    they may have one.
     """
     total = math.fsum(light.weight for light in lights)
+    sizes = [getattr(light, "samples", 1) for light in lights]
+    jitters = any(getattr(light, "jitter", False) for light in lights)
+    keeps_all = animated and not jitters and sum(sizes) <= UNROLLED
     blocks, kinds, numbers = [], [], []
     balls = np.zeros((max(1, len(lights)), 4))
     for number, light in enumerate(lights):
-        if light.weight == 0:
+        if light.weight == 0 and not keeps_all:
             continue
         samples = pattern(light)
         jitter = bool(getattr(light, "jitter", False))
         block = _rows(samples, jitter)
         block[:, 11:14] = light.weight / total / len(block) * colors[number]
         block[:, 14] = 1 / len(block)
-        balls[number] = ball_around(_reached(block), backend.epsilon)
+        balls[number] = ball_around(_reached(block), backend.epsilon) if light.weight else NOTHING_LIT
         blocks.append(block)
         kinds.append(np.full(len(block), samples.kind if jitter else POINT))
         numbers.append(np.full(len(block), number))
@@ -101,7 +114,6 @@ def compile_lights(
     owners = np.concatenate(numbers) if numbers else np.zeros(1, np.int64)
     sides, decided = _plane_bits(table[:, :3], planes, backend)
     count = sum(map(len, blocks))
-    jitters = any(getattr(light, "jitter", False) for light in lights)
     few = count <= UNROLLED and not jitters
     return LightTables(
         rows=backend.table(table),
@@ -113,7 +125,7 @@ def compile_lights(
         count=backend.opaque_id(count),
         seed=backend.opaque_id(seed & 0xFFFFFFFF),
         jitter=jitters,
-        areas=any(len(block) > 1 for block in blocks),
+        areas=any(size > 1 for size in sizes),
         unrolled=_unrolled(backend, table[:count], owners, balls, sides, decided) if few else None,
     )
 

@@ -15,7 +15,7 @@ from tracer.film.counts import number_of_rays, together
 from tracer.film.film import Film
 from tracer.film.layout import VISIBILITY
 from tracer.film.work_file import WorkFile
-from tracer.first_hits import first_hits
+from tracer.first_hits import enough_for_bundles, first_hits
 from tracer.kept_bands import KeptBands, identity_of
 from tracer.launch import COUNTERS, counts_of, trace_lanes
 from tracer.memory import need_of, rays_that_fit
@@ -62,8 +62,11 @@ class Passes:
         self._work = work
         self._components = components_of(self.layers, len(scene.lights))
         self._counted_shapes = len(scene.shapes) if settings.count_hits else 0
+        x0, y0, x1, y1 = self.rectangle
+        # with fewer rays no frame asks bundles
+        self._animated = settings.animated and enough_for_bundles((x1 - x0) * (y1 - y0) * self.n**2)
         with self.phases.phase("build"):
-            self._device = compile_scene(scene, backend)
+            self._device = compile_scene(scene, backend, settings.animated)
             self.device_canvas = DeviceCanvas.of(backend, self.canvas)
 
     def over(self, rectangle: Rectangle) -> Film:
@@ -113,7 +116,7 @@ class Passes:
 
     def launch(self, lanes: Lanes, canvas: DeviceCanvas, n: int) -> Found:
         """The layers of the pixels of `lanes`, and what was counted; primary rays of each pixel."""
-        first = first_hits(self._device, self.canvas, canvas, lanes, n)
+        first = first_hits(self._device, self.canvas, canvas, lanes, n, self._animated)
         found = trace_lanes(self._device, canvas, lanes, first, tuple(self.layers), self._counted_shapes)
         counts = counts_of(found) | {"primary": n * n}
         arrays = {key: values.numpy() for key, values in found.items()}

@@ -52,6 +52,7 @@ def render(
     work: WorkFile | None = None,
     count_hits: bool = False,
     threshold: float | None = None,
+    animated: bool = False,
 ) -> Result:
     """Renders a scene.
 
@@ -77,6 +78,8 @@ def render(
             `stats["hits"]`, in the order of the shapes. It takes a kernel of its own; no pixel depends on it.
         threshold: of an adaptive picture: pixels whose display values, or coverage, differ by so much or more
             are refined; 0 (all of them, the bytes of the full grid) to 1; None: 0.015.
+        animated: for each frame of an animation: the first one compiles the kernels of all, also those for
+            which it has no use itself. No pixel depends on it.
 
     Returns: `color` (h, w, 3) float32 (float64 in double precision), display-referred and not clamped;
         `depth` (h, w), distance from the canvas along the ray, -1 blank; `alpha`, `z`, `aovs`, `stats`.
@@ -99,6 +102,7 @@ def render(
         memory,
         count_hits,
         threshold,
+        animated,
     ).checked()
     types = find_backend(settings.backend, settings.precision)
     with exact_arithmetic(), thread_count(settings.threads):

@@ -23,6 +23,9 @@ import drjit as dr
 MOST_RECORDINGS = 32
 """Of one program; they hold no arrays."""
 
+MOST_STRUCTURES = 256
+"""That are remembered to have been there."""
+
 NOT_IN_KERNELS = {"kernels": False}
 """Metadata of a field of a record that kernels do not read: a program passes it over."""
 
@@ -72,7 +75,29 @@ class Program:
         return found
 
 
-_PROGRAMS: list[Program] = []
+class FirstTimes:
+    """Tells which structures come for the first time."""
+
+    def __init__(self) -> None:
+        self._seen: set[Structure] = set()
+        _PROGRAMS.append(self)
+
+    def __call__(self, *arguments: Any) -> bool:
+        """Whether no arguments of this structure came before; or so many others did that nobody knows."""
+        structure = take_apart(arguments, [])
+        if structure in self._seen:
+            return False
+        if len(self._seen) >= MOST_STRUCTURES:
+            self._seen.clear()
+        self._seen.add(structure)
+        return True
+
+    def forget(self) -> None:
+        """From now on all come for the first time."""
+        self._seen.clear()
+
+
+_PROGRAMS: list[Program | FirstTimes] = []
 
 
 def forget_recordings() -> None:

@@ -46,6 +46,7 @@ class Settings:
     memory: int | None = None
     count_hits: bool = False
     threshold: float | None = None
+    animated: bool = False
 
     @property
     def adaptive(self) -> bool:

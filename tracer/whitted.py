@@ -209,8 +209,9 @@ def _known_shadows(backend: Backend, first: FirstHits | None, number: Any, is_pr
     """What is known of the lights of primary hits."""
     if first is None or not first.hidden:
         return None
-    hidden = [dr.gather(backend.UInt32, found, number, is_primary) == HIDDEN for found in first.hidden]
-    return Shadows(is_primary, hidden)
+    found = [dr.gather(backend.UInt32, hidden, number, is_primary) for hidden in first.hidden]
+    known = [is_primary & (answer != DOUBTFUL) for answer in found]
+    return Shadows(known, [answer == HIDDEN for answer in found])
 
 
 def primary_path(scene: DeviceScene, canvas: DeviceCanvas, pixels: PixelGrid, sub_ray: Any) -> Any:

@@ -88,12 +88,12 @@ class Found:
             unknown=dr.select(unknown, backend.UInt32(1), 0),
         )
 
-    def open_places(self) -> Any:
-        """The places (k,) of rays that need more than their bundle, padded like `_numbers_where`."""
-        bundles = _numbers_where(self.open != 0)
+    def open_places(self, someone: bool) -> Any:
+        """The places (k,) of rays that need more than their bundle, as by `_numbers_where`."""
+        bundles = _numbers_where(self.open != 0, someone)
         if len(bundles) == 0:
             return bundles
-        chosen = _numbers_where(self.is_open(_all_rays_of(bundles)))
+        chosen = _numbers_where(self.is_open(_all_rays_of(bundles)), someone)
         return _rays_of(bundles, chosen)
 
     def is_open(self, places: Any) -> Any:
@@ -114,22 +114,24 @@ def answers_to(
     in_bundles: Callable[[Any, bool], Found],
     among: Callable[[Found, Any, Any], Any],
     singly: Callable[[Any], Any],
+    every_kernel: bool = False,
 ) -> Any:
     """The answers to so many rays by number.
 
     `in_bundles(numbers, both)`: by bundles with these numbers (n,), by the kernel for both signs or the
     other; `among(found, places, numbers)`: by the candidates of rays in these places (k,) of what bundles
     found, or `DOUBTFUL`; `singly(numbers)`: by walks of single rays (k,). `index`: the type of numbers and
-    answers.
+    answers. `every_kernel`: where no ray needs one of these, the first is asked all the same, which changes
+    no answer: so all kernels are compiled, and none when other rays need them.
     """
 
     def settled(bundles: Any, both: bool) -> Found:
         found = in_bundles(bundles, both)
-        places = found.open_places()
+        places = found.open_places(every_kernel)
         if len(places) > 0:
             numbers = _rays_of(bundles, places)
             answers = among(found, places, numbers)
-            doubtful = _numbers_where(answers == DOUBTFUL)
+            doubtful = _numbers_where(answers == DOUBTFUL, every_kernel)
             if len(doubtful) > 0:
                 dr.scatter(answers, singly(dr.gather(index, numbers, doubtful)), doubtful)
             dr.scatter(found.answers, answers, places)
@@ -137,9 +139,11 @@ def answers_to(
         return found
 
     found = settled(dr.arange(index, rays // RAYS), False)
-    numbers = _numbers_where(found.unknown == 1)
+    numbers = _numbers_where(found.unknown == 1, every_kernel)
     if len(numbers) > 0:
-        dr.scatter(found.answers, settled(numbers, True).answers, _all_rays_of(numbers))
+        answers = settled(numbers, True).answers
+        # Only now: what waits while a program runs becomes another kernel if that was just recorded.
+        dr.scatter(found.answers, answers, _all_rays_of(numbers))
         dr.eval(found.answers)
     return found.answers
 
@@ -154,13 +158,17 @@ def _all_rays_of(bundles: Any) -> Any:
     return _rays_of(bundles, dr.arange(type(bundles), len(bundles) * RAYS))
 
 
-def _numbers_where(mask: Any) -> Any:
+def _numbers_where(mask: Any, someone: bool) -> Any:
     """Numbers of the lanes of a mask, evaluated, the last one repeated up to a length that few others differ
-    from, since each length is recorded for itself; empty when there are none."""
+    from, since each length is recorded for itself. When there are none they are empty, or the first lane
+    where it has to be `someone`."""
     numbers: Any = dr.compress(mask)
     n, index = len(numbers), type(numbers)
-    if n == 0:
+    if n == 0 and not someone:
         return numbers
+    if n <= 1:
+        # Arrays of one number would have kernels of their own.
+        n, numbers = RAYS, dr.opaque(index, numbers[0] if n else 0, RAYS)
     step = max(RAYS, 1 << max(0, n.bit_length() - 3))
     slot = dr.arange(index, -(-n // step) * step)
     padded = dr.gather(index, numbers, dr.minimum(slot, dr.opaque(index, n - 1)))

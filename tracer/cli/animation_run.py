@@ -112,7 +112,8 @@ class AnimationRun:
                 self._interruption.check()
 
         earlier = seconds_in(work)
-        result = render(self._job.view.at(frame), progress=report, work=work, **self._wishes.settings)
+        scene = self._job.view.at(frame)
+        result = render(scene, progress=report, work=work, animated=True, **self._wishes.settings)
         self._statistics.take(result, earlier)
         return result
 
