@@ -173,6 +173,27 @@ def test_progress_as_a_bar(tracer: Run) -> None:
     assert re.search(r"small 100 % \|.*\| 00:\d\d elapsed, 00:00 remaining, [\d.]+ Mrays/s", done.stderr)
 
 
+@pytest.mark.parametrize("quiet", [False, True])
+def test_a_terminal_shows_a_bar(quiet: bool, repository: Path, tmp_path: Path) -> None:
+    """One that does not know its size, too, as pseudo terminals begin."""
+    pty = pytest.importorskip("pty", reason="needs pseudo terminals")
+    (tmp_path / "small.toml").write_text(SMALL_SCENE)
+    shown, terminal = pty.openpty()
+    subprocess.run(
+        [*COMMAND, "render", "small.toml", *(["--quiet"] if quiet else [])],
+        cwd=tmp_path,
+        env=environment(repository),
+        stdout=subprocess.DEVNULL,
+        stderr=terminal,
+        timeout=120,
+        check=True,
+    )
+    os.write(terminal, b"over")
+    text = os.read(shown, 10000).decode()
+    assert text.endswith("over")
+    assert quiet == (text == "over") and quiet != ("small 100 %" in text)
+
+
 def test_a_bad_scene_does_not_stop_the_others(tracer: Run, tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text("ambiant = 1\n")
     (tmp_path / "late.toml").write_text(SMALL_SCENE + '[[shapes]]\nkind = "mesh"\nfile = "late.obj"\n')

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import time
 from typing import Any, Protocol
@@ -111,4 +112,13 @@ class _Bar:
 
         tqdm.monitor_interval = 0  # no thread of its own
         options = {"desc": self._name, "file": sys.stderr, "leave": False, "bar_format": self.FORMAT}
-        return tqdm(total=total, initial=done, **options)
+        return tqdm(total=total, initial=done, **options, **_size())
+
+
+def _size() -> dict[str, int]:
+    """That of a terminal which does not know its own, as under `script`: tqdm would draw nothing."""
+    try:
+        told = os.get_terminal_size(sys.stderr.fileno()).columns > 0
+    except (OSError, ValueError):  # no terminal
+        told = True
+    return {} if told else {"ncols": 80, "nrows": 24}
