@@ -133,6 +133,12 @@ def test_frames_of_an_animation(tracer: Run, tmp_path: Path) -> None:
     assert rows[2] == rows[3], "after its last time a key stays as it is"
 
 
+def test_one_frame_is_one(tracer: Run, tmp_path: Path) -> None:
+    done = tracer("render", "balls.toml", "--frames", "3")
+    assert done.stdout.startswith("balls.0003.png  1 frame  "), done.stdout
+    assert names(tmp_path) == ["balls.0003.png"]
+
+
 def test_what_cannot_be_rendered_is_refused_at_once(tracer: Run, tmp_path: Path) -> None:
     cases = [
         (("render", "balls.toml", "--frames", "5:1"), "--frames 5:1: is out of range"),

@@ -279,8 +279,12 @@ BAD_ARGUMENTS = {
     ),
     "empty crop": (("small.toml", "--crop", "3", "3", "3", "9"), "crop: 3 3 3 9 is empty"),
     "unknown extension": (
+        ("small.toml", "-o", "x.jpg"),
+        'x.jpg: the extension ".jpg" is unknown; allowed: .png',
+    ),
+    "movie without frames": (
         ("small.toml", "-o", "x.gif"),
-        'x.gif: the extension ".gif" is unknown; allowed: .png',
+        "x.gif: is the name of a movie, which takes --frames, such as --frames 1:120",
     ),
     "missing folder": (("small.toml", "-o", "no/x.png"), "no/x.png: the folder no does not exist"),
     "unknown field": (("small.toml", "-o", "{nome}.png"), "unknown field {nome}"),

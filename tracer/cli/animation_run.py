@@ -146,7 +146,8 @@ class AnimationRun:
         names += told_layers(str(files.layer_base(frames[0])), files.layers)
         kept = len(frames) - rendered
         were_kept = f" ({kept} {'was' if kept == 1 else 'were'} finished before)" if kept else ""
-        click.echo(f"{', '.join(names)}  {len(frames)} frames{were_kept}  {self._statistics.speed()}")
+        number = f"{len(frames)} frame{'s' if len(frames) > 1 else ''}"
+        click.echo(f"{', '.join(names)}  {number}{were_kept}  {self._statistics.speed()}")
 
 
 def _span(template: str, frames: range) -> str:
