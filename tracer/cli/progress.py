@@ -118,7 +118,7 @@ class _Bar:
 def _size() -> dict[str, int]:
     """That of a terminal which does not know its own, as under `script`: tqdm would draw nothing."""
     try:
-        told = os.get_terminal_size(sys.stderr.fileno()).columns > 0
+        columns, lines = os.get_terminal_size(sys.stderr.fileno())
     except (OSError, ValueError):  # no terminal
-        told = True
-    return {} if told else {"ncols": 80, "nrows": 24}
+        return {}
+    return {} if columns and lines else {"ncols": columns or 80, "nrows": lines or 24}
