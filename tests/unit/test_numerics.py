@@ -12,6 +12,7 @@ import tracer
 from tracer import arrival, ray
 from tracer.backends import Backend, exact_arithmetic, find_backend
 from tracer.ray import mirror_direction, normalize
+from tracer.spawn import refract_direction
 from tracer.textures.cells import CellRule
 
 PRECISIONS = ("single", "double")
@@ -73,6 +74,21 @@ def test_directions_stay_unit_from_bounce_to_bounce(precision: str, monkeypatch:
     assert length_error_after_bounces(backend) <= 4
     monkeypatch.setattr(ray, "unit_again", lambda d: d)
     assert length_error_after_bounces(backend) > 20
+
+
+@pytest.mark.parametrize("ior", [1e-6, 1.5, 1e6])
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_refracted_directions_are_unit_for_any_index(precision: str, ior: float) -> None:
+    """eta = 1e6 multiplies the rounding of d and c, so that the sum is no longer nearly unit."""
+    backend = find_backend("llvm", precision)
+    with exact_arithmetic():
+        n = normalize(vectors(backend, 5)[0])
+        aside = normalize(vectors(backend, 6)[0])
+        d = normalize(dr.fma(backend.Float(1e-7), aside, -n))
+        for entering in (True, False):
+            bent, total = refract_direction(d, n, backend.Float(ior), backend.Bool(entering))
+            length = np.sqrt((bent.numpy().astype(np.longdouble) ** 2).sum(axis=0))
+            assert np.abs(length - 1)[~total.numpy()].max() <= 4 * backend.epsilon
 
 
 def colors_on_a_border(precision: str) -> set[float]:
