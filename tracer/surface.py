@@ -8,7 +8,7 @@ from typing import Any
 
 import drjit as dr
 
-from tracer.acceleration.triangle import gather_triangle
+from tracer.acceleration.triangle import Triangle, gather_triangle
 from tracer.branches import changed_where
 from tracer.device_scene import DeviceScene
 from tracer.device_shapes import KIND_UNIT, MESH, PLANE, SPHERE
@@ -121,7 +121,7 @@ def _smooth_normal(
         slot = slot_of(scene, primitive, True)
         triangle = gather_triangle(backend, triangles, slot)
         normals = gather_triangle(backend, vertex_normals, slot)
-        b1, b2 = barycentrics(triangle.v0, triangle.v1, triangle.v2, p)
+        b1, b2 = barycentrics(triangle, p)
         mixed = normalize((1 - b1 - b2) * normals.v0 + b1 * normals.v1 + b2 * normals.v2)
         mixed = dr.select(entering, mixed, -mixed)
         return dr.select(dr.dot(mixed, d) < 0, mixed, lit_side)
@@ -130,10 +130,13 @@ def _smooth_normal(
     return changed_where(active & (wanted == 1), lit_side, interpolated, label="smooth")
 
 
-def barycentrics(v0: Any, v1: Any, v2: Any, p: Any) -> tuple[Any, Any]:
-    """Weights of v1 and v2 at a point p of the triangle, by areas projected on the normal (document, section
-    5.9)."""
-    e1, e2, q = v1 - v0, v2 - v0, p - v0
-    cross = dr.cross(e1, e2)
-    area2 = dr.squared_norm(cross)
-    return dr.dot(dr.cross(q, e2), cross) / area2, dr.dot(dr.cross(e1, q), cross) / area2
+def barycentrics(triangle: Triangle, p: Any) -> tuple[Any, Any]:
+    """Weights of v1 and v2 at a point p of the triangle, by areas projected on its unit normal (document,
+    section 5.9).
+
+    Products of two lengths alone: those of four, as in |cross|², leave the range of single precision where
+    edges are 1e10 or 1e-10 long.
+    """
+    e1, e2, q, n = triangle.v1 - triangle.v0, triangle.v2 - triangle.v0, p - triangle.v0, triangle.normal
+    area2 = dr.dot(dr.cross(e1, e2), n)
+    return dr.dot(dr.cross(q, e2), n) / area2, dr.dot(dr.cross(e1, q), n) / area2

@@ -91,6 +91,30 @@ def test_refracted_directions_are_unit_for_any_index(precision: str, ior: float)
             assert np.abs(length - 1)[~total.numpy()].max() <= 4 * backend.epsilon
 
 
+def normals_of_a_smooth_cube(precision: str, size: float) -> np.ndarray:
+    """(h, w, 3) shading normals of a cube of that size, seen from as many sizes away."""
+    scene = tracer.load(
+        {
+            "camera": {
+                "resolution": [16, 12],
+                "origin": [3 * size, 2 * size, 4 * size],
+                "target": [0, 0, 0],
+                "fov": 40,
+            },
+            "shapes": [{"kind": "mesh", "builtin": "cube", "scale": size, "smooth": True}],
+        }
+    )
+    return tracer.render(scene, precision=precision, aovs=("normal",)).aovs["normal"]
+
+
+@pytest.mark.parametrize("size", [2.0**-50, 2.0**-33, 2.0**33, 2.0**50])
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_smooth_normals_do_not_depend_on_the_size(precision: str, size: float) -> None:
+    """A power of two changes no rounding, as long as nothing leaves the range of the numbers."""
+    found, wanted = (normals_of_a_smooth_cube(precision, each) for each in (size, 1.0))
+    assert np.array_equal(found, wanted, equal_nan=True)
+
+
 def colors_on_a_border(precision: str) -> set[float]:
     """The colors of a tilted plane that lies exactly on the border of two stripes."""
     scene = tracer.load(
