@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from tracer.backends import exact_arithmetic, find_backend
 from tracer.device_scene import DeviceScene, compile_scene
 from tracer.errors import UsageError
+from tracer.given_scene import given_scene
 from tracer.intersection import closest_hit, free_ray
 from tracer.leaving import leave
 from tracer.query_arrays import numbers_of, rays_from, upload, upload_directions
@@ -59,7 +60,7 @@ def trace_path(
     Raises: `UsageError` for wrong shapes, NaN and zero directions, other letters than R and T.
     """
     types = find_backend(backend, precision)
-    o, d = rays_from(origins, directions)
+    scene, (o, d) = given_scene(scene), rays_from(origins, directions, types)
     refracts = _events(events, len(o))
     n, k = refracts.shape
     position, direction = np.full((n, k, 3), np.nan), np.full((n, k, 3), np.nan)
@@ -90,8 +91,10 @@ def trace_path(
 
 def _events(events: str | Sequence[str], n: int) -> np.ndarray:
     """(n, k) bool: the event is a refraction. Data, not structure: all chains share one kernel."""
-    rows = [events] if isinstance(events, str) else list(events)
+    rows = list(events) if isinstance(events, Iterable) and not isinstance(events, str) else [events]
     for row in rows:
+        if not isinstance(row, str):
+            raise UsageError(f"events: {row!r} is no string; allowed are the letters R and T")
         wrong = sorted(set(row) - {"R", "T"})
         if wrong:
             raise UsageError(f"events: {row!r} contains {wrong[0]!r}; allowed are the letters R and T")

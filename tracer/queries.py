@@ -13,8 +13,9 @@ import drjit as dr
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tracer.backends import INVALID, exact_arithmetic, find_backend
+from tracer.backends import INVALID, Backend, exact_arithmetic, find_backend
 from tracer.device_scene import DeviceScene, compile_scene
+from tracer.given_scene import given_scene
 from tracer.intersection import closest_hit, free_ray
 from tracer.query_arrays import (
     distances_from,
@@ -65,13 +66,14 @@ def intersect(
         origins, directions: (n, 3), or (3,) for one; directions need not be normalized.
         t_max: (n,) or a number: hits beyond this distance do not count.
 
-    Raises: `UsageError` for wrong shapes, NaN and zero directions.
+    Raises: `UsageError` for wrong shapes, NaN, zero directions, and coordinates whose squares leave the range
+        of the precision.
     """
     types = find_backend(backend, precision)
-    o, d = rays_from(origins, directions)
+    scene, (o, d) = given_scene(scene), rays_from(origins, directions, types)
     limit = None if t_max is None else distances_from(t_max, len(o))
     if not len(o):
-        return _no_hits()
+        return _no_hits(types)
     with exact_arithmetic():
         device = compile_scene(scene, types)
         ray = free_ray(device, upload(types, o), upload_directions(types, d))
@@ -92,7 +94,8 @@ def visible(
     |coordinate| among points, targets and finite shapes.
     """
     types = find_backend(backend, precision)
-    p, q = points_from(points, "points"), points_from(targets, "targets")
+    scene = given_scene(scene)
+    p, q = points_from(points, "points", types), points_from(targets, "targets", types)
     p, q = (np.ascontiguousarray(a) for a in np.broadcast_arrays(p, q))
     if not len(p):
         return np.zeros(0, bool)
@@ -128,6 +131,6 @@ def _hits(device: DeviceScene, hit: Hit, surface: Any) -> Hits:
     )
 
 
-def _no_hits() -> Hits:
-    ids, vectors = np.zeros(0, np.int64), np.zeros((0, 3))
-    return Hits(np.zeros(0), ids, ids, ids, vectors, vectors, np.zeros(0, bool))
+def _no_hits(backend: Backend) -> Hits:
+    ids, vectors = np.zeros(0, np.int64), np.zeros((0, 3), backend.dtype)
+    return Hits(np.zeros(0, backend.dtype), ids, ids, ids, vectors, vectors, np.zeros(0, bool))

@@ -19,9 +19,26 @@ UNIT_SLACK = 6
 the sum of their squares (4)."""
 
 
-def points_from(values: ArrayLike, name: str) -> np.ndarray:
+def points_from(values: ArrayLike, name: str, backend: Backend) -> np.ndarray:
+    """(n, 3) float64 in the range of the precision; raises `UsageError` that names the argument."""
+    array = vectors_from(values, name)
+    limit = float(np.sqrt(np.finfo(backend.dtype).max / 12))  # |p - q|² is at most 3 (2 limit)²
+    far = (np.abs(array) > limit).any(axis=1)
+    if far.any():
+        row = int(np.argmax(far))
+        raise UsageError(
+            f"{name}: row {row} is {array[row].tolist()}; "
+            f"allowed in {backend.precision} precision are coordinates up to {limit:.2g}"
+        )
+    return array
+
+
+def vectors_from(values: ArrayLike, name: str) -> np.ndarray:
     """(n, 3) finite float64; raises `UsageError` that names the argument."""
-    array = np.atleast_2d(np.asarray(values, np.float64))
+    try:
+        array = np.atleast_2d(np.asarray(values, np.float64))
+    except (TypeError, ValueError):
+        raise UsageError(f"{name}: these are no numbers; allowed is an array (n, 3) of them") from None
     if array.ndim != 2 or array.shape[1] != 3:
         raise UsageError(f"{name}: the shape is {np.shape(values)}; allowed is (n, 3)")
     if not np.isfinite(array).all():
@@ -30,10 +47,10 @@ def points_from(values: ArrayLike, name: str) -> np.ndarray:
     return array
 
 
-def rays_from(origins: ArrayLike, directions: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+def rays_from(origins: ArrayLike, directions: ArrayLike, backend: Backend) -> tuple[np.ndarray, np.ndarray]:
     """Origins and directions, (n, 3) each, the latter of any length but 0; raises `UsageError`."""
-    o, d = points_from(origins, "origins"), points_from(directions, "directions")
-    zero = ~d.any(axis=1)
+    o, d = points_from(origins, "origins", backend), vectors_from(directions, "directions")
+    zero = np.abs(d).max(axis=1) < np.finfo(np.float64).tiny  # subnormal numbers are zero here, as in kernels
     if zero.any():
         raise UsageError(f"directions: row {int(np.argmax(zero))} is zero; allowed is a direction")
     try:
@@ -49,7 +66,7 @@ def distances_from(t_max: ArrayLike, n: int) -> np.ndarray:
     """(n,) float64 without NaN; raises `UsageError`."""
     try:
         limit = np.broadcast_to(np.asarray(t_max, np.float64), n)
-    except ValueError:
+    except (TypeError, ValueError):
         raise UsageError(f"t_max: the shape is {np.shape(t_max)}; allowed is a number or ({n},)") from None
     if np.isnan(limit).any():
         raise UsageError("t_max: NaN is not allowed")
@@ -67,7 +84,8 @@ def upload_directions(backend: Backend, directions: np.ndarray) -> Any:
     Those that have unit length within rounding stay as they are: normalized once more, a ray could pass on
     the other side of the edge or corner that it is aimed at.
     """
-    given = upload(backend, directions)
+    with np.errstate(over="ignore"):  # what single precision cannot hold has no unit length
+        given = upload(backend, directions)
     is_unit = dr.abs(dr.squared_norm(given) - 1) <= UNIT_SLACK * backend.epsilon
     scaled = upload(backend, directions / np.abs(directions).max(axis=1, keepdims=True))
     return dr.select(is_unit, given, normalize(scaled))

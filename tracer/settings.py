@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from numbers import Integral, Real
+from typing import Any, Literal, cast
 
 from tracer.aovs import NAMES
 from tracer.canvas import Canvas
 from tracer.errors import UsageError
+from tracer.given_scene import given_scene
 from tracer.scene import Scene
 from tracer.tiles import Rectangle
 
@@ -62,32 +64,46 @@ class Settings:
 
     def checked(self) -> Settings:
         """The settings with AOV names, each once, and the threshold spelled out; raises `UsageError`."""
-        aovs = (self.aovs,) if isinstance(self.aovs, str) else tuple(dict.fromkeys(self.aovs))
+        aovs = self._checked_aovs()
+        threshold = self._checked_threshold()
+        self._check_numbers()
+        return Settings(**(vars(self) | {"aovs": aovs, "threshold": threshold}))
+
+    def _checked_aovs(self) -> tuple[str, ...]:
+        try:
+            aovs = (self.aovs,) if isinstance(self.aovs, str) else tuple(dict.fromkeys(self.aovs))
+        except TypeError:
+            raise UsageError(f"aovs: {self.aovs!r} is no list of names") from None
         known = ["depth", *NAMES]
         if "all" in aovs:
             aovs = tuple(known)
         for name in aovs:
             if name not in known:
                 raise UsageError(f"aov: {name!r} is unknown; allowed are {', '.join(known)} and all")
-        threshold = self._checked_threshold()
-        if not (math.isfinite(self.scale) and self.scale > 0):
-            raise UsageError(f"scale: {self.scale} is out of range; allowed is a number above 0")
-        if self.threads is not None and self.threads < 1:
-            raise UsageError(f"threads: {self.threads} is out of range; allowed is 1 or more")
-        if self.memory is not None and self.memory < 1:
-            raise UsageError(f"memory: {self.memory} is out of range; allowed is 1 byte or more")
-        if self.resolution is not None and min(self.resolution) < 1:
-            raise UsageError(f"resolution: {self.resolution} is out of range; allowed is 1 or more")
-        return Settings(**(vars(self) | {"aovs": aovs, "threshold": threshold}))
+        return aovs
+
+    def _check_numbers(self) -> None:
+        scale: Any = self.scale
+        if not (isinstance(scale, Real) and math.isfinite(scale) and float(scale) > 0):
+            raise UsageError(f"scale: {scale} is out of range; allowed is a number above 0")
+        for name in ("threads", "memory", "rays_per_band"):
+            value = getattr(self, name)
+            if value is not None and not _are_whole([value], 1, 1):
+                raise UsageError(f"{name}: {value} is out of range; allowed is a whole number, 1 or more")
+        for name, count, least in (("resolution", 2, 1), ("crop", 4, None)):
+            value = getattr(self, name)
+            if value is not None and not _are_whole(value, count, least):
+                limit = "" if least is None else f", {least} or more"
+                raise UsageError(f"{name}: {value} is out of range; allowed are {count} whole numbers{limit}")
 
     def _checked_threshold(self) -> float | None:
         """That of an adaptive picture; checks the sub-rays."""
-        n, threshold = self.supersample, self.threshold
+        n, threshold = self.supersample, cast(Any, self.threshold)
         if n == ADAPTIVE:
-            threshold = ADAPTIVE_THRESHOLD if threshold is None else float(threshold)
-            if not 0 <= threshold <= 1:
+            threshold = ADAPTIVE_THRESHOLD if threshold is None else threshold
+            if not (isinstance(threshold, Real) and 0 <= float(threshold) <= 1):
                 raise UsageError(f"threshold: {threshold} is out of range; allowed is 0 to 1")
-            return threshold
+            return float(threshold)
         if n is not None and n not in range(1, LARGEST_SUPERSAMPLE + 1):
             raise UsageError(
                 f"supersample: {n} is out of range; allowed is 1 to {LARGEST_SUPERSAMPLE}, or {ADAPTIVE}"
@@ -95,6 +111,16 @@ class Settings:
         if threshold is not None:
             raise UsageError(f"threshold: {threshold} has a meaning only where supersample is {ADAPTIVE}")
         return None
+
+
+def _are_whole(values: Any, count: int, least: int | None) -> bool:
+    """Whether these are so many whole numbers, none below the least."""
+    try:
+        numbers = list(values)
+    except TypeError:
+        return False
+    whole = len(numbers) == count and all(isinstance(number, Integral) for number in numbers)
+    return whole and (least is None or min(numbers) >= least)
 
 
 def picture_canvas(scene: Scene, settings: Settings) -> Canvas:
@@ -123,7 +149,8 @@ def picture_rectangle(crop: Rectangle | None, canvas: Canvas) -> Rectangle:
 
 
 def with_seed(scene: Scene, seed: int | None) -> Scene:
-    """The scene with both its seeds replaced."""
+    """The scene with both its seeds replaced; raises `UsageError` for what is no scene."""
+    scene = given_scene(scene)
     if seed is None:
         return scene
     scene = scene.model_copy(deep=True)
