@@ -154,6 +154,8 @@ def test_what_cannot_be_rendered_is_refused_at_once(tracer: Run, tmp_path: Path)
         (("turntable", "balls.toml", "--frames", "0"), "--frames"),
         (("turntable", "balls.toml", "--fps", "0"), "--fps"),
         (("turntable", "balls.toml", "--set", "shapes=[]", "--set", "animation=[]"), "--around names one"),
+        (("turntable", "balls.toml", "--around", "0", "nan", "0"), "--around.*nan is not a finite number"),
+        (("turntable", "balls.toml", "--around", "inf", "0", "0"), "--around.*inf is not a finite number"),
         (("turntable", "nowhere.toml"), "no such scene"),
     ]
     for arguments, message in cases:

@@ -119,7 +119,7 @@ _PICTURE_OPTIONS = (
         multiple=True,
         metavar="FILE",
         help="A .png, .exr or .npz file; of frames also .mp4, .webm or .gif. {name} is the scene's name. "
-        "Repeatable.  [default: {name}.png]",
+        "Repeatable.  [default: {name}.png; of a turntable {name}.mp4]",
     ),
     click.option(
         "--scale", type=float, default=1.0, metavar="S", help="Size against the scene's resolution."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import click
@@ -10,6 +11,16 @@ from tracer.cli.interruption import Interruption
 from tracer.cli.options import animation_options, picture_options, scene_options
 
 MOST_FRAMES = 1_000_000
+
+
+def _finite(
+    _: click.Context, __: click.Parameter, point: tuple[float, float, float] | None
+) -> tuple[float, float, float] | None:
+    """The point; NaN and infinity are bad usage."""
+    for number in point or ():
+        if not math.isfinite(number):
+            raise click.BadParameter(f"{number} is not a finite number.")
+    return point
 
 
 @click.command(short_help="Render a movie from around a scene.")
@@ -23,7 +34,12 @@ MOST_FRAMES = 1_000_000
     help="Frames of a full turn.",
 )
 @click.option(
-    "--around", type=float, nargs=3, metavar="X Y Z", help="The point in the middle.  [default: see above]"
+    "--around",
+    type=float,
+    nargs=3,
+    callback=_finite,
+    metavar="X Y Z",
+    help="The point in the middle.  [default: see above]",
 )
 @animation_options
 @picture_options
