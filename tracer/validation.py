@@ -62,6 +62,8 @@ def _objection(error: dict[str, Any], record: type[BaseModel]) -> tuple[list[str
     """Path and rest of the sentence for one pydantic error."""
     kind, found, context = error["type"], show(error["input"]), error.get("ctx", {})
     path, records = _locate(error["loc"], record)
+    if path[-1:] == ["[key]"] and kind.startswith("string_too_"):  # pydantic's mark of the key itself
+        path = path[:-1]
     if kind == "missing":
         return path, "is missing; it must be given"
     if kind in _UNKNOWN:

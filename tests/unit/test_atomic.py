@@ -84,6 +84,11 @@ def test_check_writable_leaves_nothing_behind(tmp_path):
     assert os.listdir(tmp_path) == ["old.png"]
 
 
+def test_check_writable_refuses_no_name_at_all():
+    with pytest.raises(OutputError, match='^"": is no file name$'):
+        check_writable("")
+
+
 def test_check_writable_takes_a_bare_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     check_writable("a.png")

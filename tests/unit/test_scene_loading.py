@@ -96,6 +96,8 @@ def test_source_that_is_no_scene(tmp_path: Path) -> None:
         load(tmp_path)
     with pytest.raises(SceneError, match="is no usable file name"):
         load("a\0b.toml")
+    with pytest.raises(SceneError, match='^scene: "" is no usable file name$'):
+        load("")
     with pytest.raises(SceneError, match="is no usable file name|there is no such scene file"):
         load("a" * 5000)
     with pytest.raises(SceneError, match="5 is no scene; allowed: a path, a built-in name or a dict"):

@@ -165,6 +165,11 @@ REFUSED = [
     ),
     (_shape(kind="mesh"), "`shapes.0` needs one of `file`, `vertices` with `faces`, or `builtin`"),
     (_shape(kind="mesh", file=""), '`shapes.0.file` is ""; allowed: a string that is not empty'),
+    (
+        {"textures": {"": {"kind": "solid", "color": "#fff"}}},
+        '`textures.""` is ""; allowed: a string that is not empty',
+    ),
+    ({"materials": {"a" * 201: {}}}, f"`materials.{'a' * 201}` has 201 characters; allowed: at most 200"),
     (_shape(kind="mesh", file=5), "`shapes.0.file` is 5; allowed: a string"),
     (_shape(**SPHERE, name="a" * 201), f"`shapes.{'a' * 201}.name` has 201 characters; allowed: at most 200"),
     (_shape(kind="mesh", builtin="cone"), '`shapes.0.builtin` is "cone"; allowed: "cube" or "tetrahedron"'),

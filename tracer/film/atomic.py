@@ -43,6 +43,8 @@ def check_writable(path: str | os.PathLike[str], suffixes: Collection[str] = OUT
     nothing about read-only media. Raises OutputError.
     """
     shown, suffix, folder = os.fspath(path), Path(path).suffix, Path(path).parent
+    if not shown:
+        raise OutputError('"": is no file name')
     target = Path(os.path.realpath(path))
     if os.path.isdir(target):
         raise OutputError(f"{shown}: is a folder, not a file name")

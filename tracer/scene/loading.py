@@ -59,7 +59,7 @@ def find_scene(source: str | Path) -> tuple[Path, str]:
     """The scene file that a path or a built-in name means, and what messages call it."""
     if not isinstance(source, (str, Path)):
         raise SceneError(f"scene: {show(source)} is no scene; allowed: a path, a built-in name or a dict")
-    if "\0" in str(source):
+    if not str(source) or "\0" in str(source):
         raise SceneError(f"scene: {show(str(source))} is no usable file name")
     path, builtin = Path(source), builtin_scenes()
     try:
