@@ -1205,9 +1205,10 @@ class Loader:
         self.materials = {name: material(entry) for name, entry in scene.get("materials", {}).items()}
 
     def color(self, value: str | Sequence[float]) -> Vec:
-        """A working value from "#rrggbb" or three numbers."""
+        """A working value from "#rrggbb", "#rgb" or three numbers."""
         if isinstance(value, str):
-            return self.decode(Vec(*(int(value[k : k + 2], 16) / 255 for k in (1, 3, 5))))
+            digits = value[1:] if len(value) == 7 else "".join(2 * digit for digit in value[1:])
+            return self.decode(Vec(*(int(digits[k : k + 2], 16) / 255 for k in (0, 2, 4))))
         return self.decode(vec(value))
 
     def decode(self, color: Vec) -> Vec:

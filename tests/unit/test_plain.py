@@ -439,6 +439,11 @@ def test_lambert_and_phong() -> None:
     assert close(shade_pixel(world, 0, 0)[0], (0.48, 0.24, 0))
 
 
+def test_short_colors() -> None:
+    whole, short = (render(scene(wall(-2.0, color=color))) for color in ("#ffaa00", "#fa0"))
+    assert np.array_equal(whole.color, short.color)
+
+
 def test_light_weights_and_colors() -> None:
     """Shares 1/4 and 3/4; a red and a blue light on the normal give (1/4, 0, 3/4); weight 0 casts no shadow
     ray.
