@@ -90,7 +90,7 @@ def _type(value: Mapping[str, Any], schema: Mapping[str, Any]) -> str:
         choices = [choice for choice in value["anyOf"] if choice.get("type") != "null"]
         if any("pattern" in choice for choice in choices):
             return "color"
-        return " or ".join(_type(choice, schema) for choice in choices)
+        return " or ".join(dict.fromkeys(_type(choice, schema) for choice in choices))
     kind = value.get("type")
     if kind == "array":
         return _list(value, schema)
