@@ -163,8 +163,8 @@ def cutoff_doubled(patch: pytest.MonkeyPatch) -> None:
     module = import_module("tracer.passes")
     true = module.compile_scene
 
-    def coarse(scene: tracer.Scene, backend: Any) -> Any:
-        return true(scene.model_copy(update={"cutoff": 2 * scene.cutoff}), backend)
+    def coarse(scene: tracer.Scene, *rest: Any) -> Any:
+        return true(scene.model_copy(update={"cutoff": 2 * scene.cutoff}), *rest)
 
     patch.setattr(module, "compile_scene", coarse)
 
