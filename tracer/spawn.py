@@ -12,7 +12,7 @@ from tracer.branches import changed_where
 from tracer.device_scene import DeviceScene
 from tracer.leaving import leave
 from tracer.path import make_path
-from tracer.ray import Ray, normalize
+from tracer.ray import Ray, normalize, unit_again
 from tracer.surface import Surface
 from tracer.textures.tables import TextureRow
 
@@ -64,7 +64,7 @@ def refract_direction(d: Any, n: Any, ior: Any, entering: Any) -> tuple[Any, Any
     eta = dr.select(entering, dr.rcp(ior), ior)
     c = -dr.dot(n, d)
     k = dr.fma(-eta * eta, dr.fma(-c, c, 1), 1)
-    bent = normalize(dr.fma(eta, d, (eta * c - dr.sqrt(k)) * n))
+    bent = unit_again(normalize(dr.fma(eta, d, (eta * c - dr.sqrt(k)) * n)))
     return dr.select(ior == 1, d, bent), (k < 0) & (ior != 1)
 
 
