@@ -20,6 +20,7 @@ from tracer.intersection import closest_hit, free_ray
 from tracer.query_arrays import (
     distances_from,
     numbers_of,
+    paired,
     points_from,
     rays_from,
     upload,
@@ -96,7 +97,7 @@ def visible(
     types = find_backend(backend, precision)
     scene = given_scene(scene)
     p, q = points_from(points, "points", types), points_from(targets, "targets", types)
-    p, q = (np.ascontiguousarray(a) for a in np.broadcast_arrays(p, q))
+    p, q = paired(p, q, "points and targets")
     if not len(p):
         return np.zeros(0, bool)
     with exact_arithmetic():

@@ -53,13 +53,15 @@ def rays_from(origins: ArrayLike, directions: ArrayLike, backend: Backend) -> tu
     zero = np.abs(d).max(axis=1) < np.finfo(np.float64).tiny  # subnormal numbers are zero here, as in kernels
     if zero.any():
         raise UsageError(f"directions: row {int(np.argmax(zero))} is zero; allowed is a direction")
-    try:
-        o, d = (np.ascontiguousarray(a) for a in np.broadcast_arrays(o, d))
-    except ValueError:
-        raise UsageError(
-            f"origins and directions: {len(o)} and {len(d)} rows; allowed is one number"
-        ) from None
-    return o, d
+    return paired(o, d, "origins and directions")
+
+
+def paired(first: np.ndarray, second: np.ndarray, names: str) -> tuple[np.ndarray, np.ndarray]:
+    """Both with the same number of rows n: one row stands for n; raises `UsageError` that names them."""
+    if len(first) != len(second) and 1 not in (len(first), len(second)):
+        raise UsageError(f"{names}: {len(first)} and {len(second)} rows; allowed is one number")
+    a, b = np.broadcast_arrays(first, second)
+    return np.ascontiguousarray(a), np.ascontiguousarray(b)
 
 
 def distances_from(t_max: ArrayLike, n: int) -> np.ndarray:

@@ -94,6 +94,13 @@ def test_points_and_directions(query: str, values: Any, message: str) -> None:
 
 
 @pytest.mark.parametrize("query", QUERIES)
+def test_as_many_points_as_directions(query: str) -> None:
+    names = "points and targets" if query == "visible" else "origins and directions"
+    with pytest.raises(UsageError, match=f"^{names}: 3 and 2 rows; allowed is one number$"):
+        QUERIES[query](tracer.load(BALL), np.zeros((3, 3)), np.ones((2, 3)))
+
+
+@pytest.mark.parametrize("query", QUERIES)
 def test_points_beyond_the_range_of_the_precision(query: str) -> None:
     """Squares of distances between points have to stay in the range of the numbers."""
     scene = tracer.load(BALL)
