@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
@@ -384,6 +385,14 @@ def test_doctor(tracer: Run) -> None:
     assert done.returncode == 0
     assert "Everything that rendering needs is here." in done.stdout
     assert json.loads(tracer("doctor", "--json").stdout)["llvm"]["works"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a shell that closes a stream")
+@pytest.mark.parametrize("closing", [">&-", "2>&-"])
+def test_a_closed_stream_is_no_error(closing: str, repository: Path, tmp_path: Path) -> None:
+    command = f"{shlex.join([*COMMAND, 'scenes'])} {closing}"
+    done = subprocess.run(command, shell=True, cwd=tmp_path, env=environment(repository), capture_output=True)
+    assert (done.returncode, done.stderr) == (0, b"")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs a pipe whose reader is gone")

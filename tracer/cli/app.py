@@ -60,7 +60,8 @@ def run(arguments: Sequence[str]) -> int:
         try:
             with cli.make_context("tracer", list(arguments), obj=interruption) as context:
                 code = cli.invoke(context)
-            sys.stdout.flush()
+            if sys.stdout is not None:  # closed by whoever started the command
+                sys.stdout.flush()
             return code or 0
         except click.exceptions.Exit as end:
             return end.exit_code
