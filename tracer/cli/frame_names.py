@@ -10,7 +10,7 @@ from pathlib import Path
 
 from tracer.errors import UsageError
 from tracer.film.atomic import OUTPUT_SUFFIXES, check_writable, fill_template
-from tracer.film.movie import MOVIE_SUFFIXES, find_ffmpeg
+from tracer.film.movie import MOVIE_SUFFIXES, find_ffmpeg, is_movie
 from tracer.film.result import layer_file
 
 LARGEST_FRAME = 10_000_000
@@ -71,7 +71,7 @@ def frame_files(templates: Sequence[str], name: str, frames: range) -> FrameFile
     `MachineError`."""
     pictures, movies = [], []
     for template in templates:
-        if Path(template).suffix.lower() in MOVIE_SUFFIXES:
+        if is_movie(template):
             if has_field(template):
                 raise UsageError(f'file name "{template}": a movie holds all frames; allowed: no {{frame}}')
             movies.append(fill_template(template, name))

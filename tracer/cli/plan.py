@@ -6,14 +6,12 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from tracer.cli.failures import report
 from tracer.errors import OutputError, TracerError, UsageError
 from tracer.film.atomic import check_writable, fill_template
 from tracer.film.false_color import picture_names
-from tracer.film.movie import MOVIE_SUFFIXES
 from tracer.film.result import layer_file
 from tracer.scene import Scene, find_scene
 from tracer.settings import Settings, picture_canvas, picture_rectangle
@@ -102,8 +100,6 @@ def _claim(file: str, source: str, owners: dict[str, str]) -> None:
             f"{file}: would be written {who}; allowed: a file of its own each, such as -o {{name}}.png"
         )
     owners[real] = source
-    if Path(file).suffix.lower() in MOVIE_SUFFIXES:
-        raise UsageError(f"{file}: is the name of a movie, which takes --frames, such as --frames 1:120")
     check_writable(file)
 
 

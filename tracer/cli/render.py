@@ -78,7 +78,11 @@ def render(
         raise UsageError("--json: shows the rays of a pixel; allowed: with --pixel")
     if frames is None:
         from tracer.cli.pictures import render_scenes
+        from tracer.film.movie import is_movie
 
+        for output in filter(is_movie, wishes.outputs):
+            what = "is the name of a movie, which takes --frames, such as --frames 1:120"
+            raise UsageError(f"{output}: {what}")
         return render_scenes(scenes, wishes, interruption)
 
     from tracer.cli.animation import render_animations

@@ -36,6 +36,11 @@ _ENCODERS: dict[str, tuple[str, ...]] = {
 }
 
 
+def is_movie(file: str) -> bool:
+    """Whether it has the name of a movie."""
+    return Path(file).suffix.lower() in MOVIE_SUFFIXES
+
+
 def find_ffmpeg() -> str:
     """The program; raises `MachineError` where there is none."""
     try:
