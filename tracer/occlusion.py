@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import drjit as dr
 
 from tracer.acceleration.nearby import toward_point
-from tracer.acceleration.traverse import Fold, visit_triangles
+from tracer.acceleration.traverse import Fold, Visit, visit_triangles
 from tracer.bits import masks_in_word
 from tracer.branches import changed_where
 from tracer.device_scene import DeviceScene
@@ -86,18 +87,13 @@ def hidden_by_triangle(
 ) -> Any:
     """Mask: `blocked` already, or a triangle, of all or `among` some (see `visit_triangles`), lies strictly
     between the two ends."""
-    assert scene.triangles is not None
-    ray, light, turned = toward_point(scene.triangles.lists, segment)
-    return visit_triangles(
-        scene.backend,
-        scene.triangles,
-        ray,
-        lambda: departure_to_light(scene, segment.ray, surface, ~turned),
+    return _visit_between(
+        scene,
+        segment,
+        surface,
         state=blocked,
-        limit=lambda blocked: segment.length,
         visit=lambda blocked, _t, _primitive, _test, valid: blocked | valid,
         active=active,
-        light=light,
         done=lambda blocked: blocked,
         among=among,
     )
@@ -125,22 +121,46 @@ def transmittance(
             segment, share, active & suspects.many, step=passed, done=lambda share: share == 0
         )
     if scene.triangles is not None:
-        ray, light, turned = toward_point(scene.triangles.lists, segment)
-        share = visit_triangles(
-            backend,
-            scene.triangles,
-            ray,
-            lambda: departure_to_light(scene, segment.ray, surface, ~turned),
+        share = _visit_between(
+            scene,
+            segment,
+            surface,
             state=share,
-            limit=lambda share: segment.length,
             visit=lambda share, _t, primitive, test, valid: dr.select(
                 valid, share * _crossed(_refraction_of(scene, primitive), test.owned), share
             ),
             active=active & suspects.meshes & (share > 0),
-            light=light,
             done=lambda share: share == 0,
         )
     return share
+
+
+def _visit_between(
+    scene: DeviceScene,
+    segment: Segment,
+    surface: Surface,
+    state: Any,
+    visit: Visit,
+    active: Any,
+    done: Callable[[Any], Any],
+    among: Fold | None = None,
+) -> Any:
+    """`visit_triangles` between the surface and the light, from the end that tells more."""
+    assert scene.triangles is not None
+    ray, light, turned = toward_point(scene.triangles.lists, segment)
+    return visit_triangles(
+        scene.backend,
+        scene.triangles,
+        ray,
+        lambda: departure_to_light(scene, segment.ray, surface, ~turned),
+        state=state,
+        limit=lambda _: segment.length,
+        visit=visit,
+        active=active,
+        light=light,
+        done=done,
+        among=among,
+    )
 
 
 def _refraction_of(scene: DeviceScene, primitive: Any) -> Any:
