@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -84,17 +85,24 @@ def _by_distance(depth: np.ndarray, source: Rectangle, canvas: Canvas) -> tuple[
     rows, columns = np.nonzero(depth > 0)
     own = depth[rows, columns].astype(np.float64)
     columns, rows = columns + source[0], rows + source[1]
-    x = (columns + 0.5 - canvas.width / 2) * canvas.pixel_size
-    y = (rows + 0.5 - canvas.height / 2) * canvas.pixel_size
-    distance = np.sqrt(canvas.distance * canvas.distance + x * x + y * y) + own  # rounded as in the kernel
+    distance = np.sqrt(_squared_distance(_numbers(canvas), columns, rows)) + own  # rounded as in the kernel
     order = np.argsort(distance, kind="stable")
     return distance[order], (rows << 16 | columns)[order]
 
 
 def eye_distance(backend: Backend, canvas: Canvas, column: Any, row: Any) -> Any:
     """|P - e| for the centers of pixels."""
-    size = backend.opaque(canvas.pixel_size)
-    x = (backend.Float(column) + 0.5 - backend.opaque(canvas.width / 2)) * size
-    y = (backend.Float(row) + 0.5 - backend.opaque(canvas.height / 2)) * size
-    distance = backend.opaque(canvas.distance)
-    return dr.sqrt(distance * distance + x * x + y * y)
+    numbers = [backend.opaque(number) for number in _numbers(canvas)]
+    return dr.sqrt(_squared_distance(numbers, backend.Float(column), backend.Float(row)))
+
+
+def _numbers(canvas: Canvas) -> tuple[float, ...]:
+    """Of a canvas: the size of a pixel, half the width and half the height in pixels, distance of the eye."""
+    return canvas.pixel_size, canvas.width / 2, canvas.height / 2, canvas.distance
+
+
+def _squared_distance(numbers: Sequence[Any], column: Any, row: Any) -> Any:
+    """|P - e|², on the host as in kernels; `numbers`: those of the canvas."""
+    size, half_width, half_height, distance = numbers
+    x, y = (column + 0.5 - half_width) * size, (row + 0.5 - half_height) * size
+    return distance * distance + x * x + y * y
