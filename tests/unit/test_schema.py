@@ -6,13 +6,13 @@ import copy
 from typing import Any
 
 import pytest
+from jsonschema import Draft202012Validator
 
 import tracer
-from tests.unit.schema_validator import is_valid
 from tracer.assets import builtin_scenes
 from tracer.scene.toml_files import read_toml
 
-SCHEMA = tracer.json_schema()
+VALIDATOR = Draft202012Validator(tracer.json_schema())
 BALL = {"name": "ball", "kind": "sphere", "center": [0, 0, 0], "radius": 1}
 WHOLE: dict[str, Any] = {
     "camera": {"depth_of_field": {"focus": 5.0}},
@@ -43,7 +43,11 @@ WRONG: tuple[dict[str, Any], ...] = (
 
 
 def valid(scene: dict[str, Any]) -> bool:
-    return is_valid(scene, SCHEMA, SCHEMA)
+    return VALIDATOR.is_valid(scene)
+
+
+def test_it_is_a_schema() -> None:
+    Draft202012Validator.check_schema(tracer.json_schema())
 
 
 @pytest.mark.parametrize("name", builtin_scenes())
